@@ -5,6 +5,7 @@
 
 mod commands;
 mod edits;
+mod forces;
 mod live;
 mod rows;
 
@@ -67,7 +68,8 @@ fn try_check(file: &[u8]) -> Result<VerifyReport, VerifyError> {
 fn rebuild(file: &[u8], mut change: impl FnMut(Message) -> Option<Message>) -> Vec<u8> {
     let mut old = LogReader::new(file).unwrap();
     let (run, scene) = (old.run().clone(), old.scene().to_vec());
-    let mut new = LogWriter::create(Vec::new(), LogOptions::default(), &run, &scene, 0).unwrap();
+    let options = LogOptions { selection: old.selection(), ..LogOptions::default() };
+    let mut new = LogWriter::create(Vec::new(), options, &run, &scene, 0).unwrap();
     while let Some(logged) = old.next_message().unwrap() {
         if let Some(message) = change(logged.message) {
             new.write(&message, logged.log_time_ns).unwrap();
@@ -84,7 +86,8 @@ fn rebuild_with_gaps(
 ) -> Vec<u8> {
     let mut old = LogReader::new(file).unwrap();
     let (run, scene) = (old.run().clone(), old.scene().to_vec());
-    let mut new = LogWriter::create(Vec::new(), LogOptions::default(), &run, &scene, 0).unwrap();
+    let options = LogOptions { selection: old.selection(), ..LogOptions::default() };
+    let mut new = LogWriter::create(Vec::new(), options, &run, &scene, 0).unwrap();
     while let Some(logged) = old.next_message().unwrap() {
         for message in change(logged.message) {
             new.write(&message, logged.log_time_ns).unwrap();

@@ -20,7 +20,7 @@ pub use frozen::{FrozenParticles, FrozenTracker};
 pub use job::{Job, Start};
 use kept_states::KeptStates;
 pub use kept_states::State;
-pub use solver_rows::colliders_row;
+pub use solver_rows::{colliders_row, forces_row};
 use state_writer::{KeyframeDue, StateWriter};
 
 /// The result of a simulation.

@@ -27,7 +27,6 @@ pub(crate) use ctl::{CtlArgs, CtlVerb, QueryVerb, WatchArgs};
 pub(crate) use domain::{DoctorArgs, PsArgs};
 use endpoint::EndpointArgs;
 pub(crate) use lesson::LessonArgs;
-pub(crate) use parameter::allowed_values_of;
 pub(crate) use run::RunArgs;
 pub(crate) use scene::{CheckArgs, ImportArgs, ScenesArgs, ShowArgs};
 

@@ -2,6 +2,7 @@
 
 mod action;
 mod command;
+mod forces;
 mod hint;
 mod parameters;
 mod particles;
@@ -36,6 +37,7 @@ fn answer(client: &mut Client, args: &CtlArgs, query: &QueryVerb) -> anyhow::Res
         QueryVerb::Get { parameter } => parameters::print(client, args, *parameter),
         QueryVerb::Status => status::print(client, args),
         QueryVerb::Hash => particles::print_hash(client, args),
+        QueryVerb::Forces => forces::print(client, args),
         QueryVerb::Particles { indices } => particles::print(client, args, indices),
         QueryVerb::Nearest(point) => particles::print_nearest(client, args, point.vector()),
     }

@@ -350,6 +350,9 @@ impl Node {
         self.statistics.record(wake_late_ns, solve_ns, self.pace.period_ns());
         self.statistics.skipped_periods = self.pace.skipped_periods;
         let times = StepTimes { wake_late_ns, solve_ns };
+        if let Err(error) = self.publisher.publish_forces(&self.solver, self.step) {
+            self.warnings.print(&format!("no forces are published: {error}"));
+        }
         self.publisher.publish_step(&self.solver, self.position(), times)?;
         self.keep_state();
         Ok(true)

@@ -137,7 +137,7 @@ fn wind_without_a_surface_is_applied_with_a_hint() {
 #[test]
 fn wind_without_drag_is_applied_with_a_hint() {
     let sandbox = Sandbox::new();
-    let _node = node(&sandbox, &["run", "curtain", "--paused"]);
+    let _node = node(&sandbox, &["run", "spring-cloth", "--paused"]);
     let without = run(&sandbox, "ctl set wind_velocity 3 0 0");
     assert_eq!(without.code, Some(0));
     assert!(without.stderr.starts_with("hint: this has no effect while wind_drag is 0"));

@@ -86,6 +86,44 @@ fn a_client_receives_the_bits_of_the_snapshot() {
 }
 
 #[test]
+fn a_client_receives_constraints_triangles_and_colliders_whenever_it_subscribes() {
+    let mut setup = Setup::start(&["--allow-commands"]);
+    let (mut client, _) = Client::start(&setup.url);
+    let topology = setup.node.topology(DEADLINE).unwrap().unwrap();
+    client.subscribe(1, "/topology");
+    let row = client.json(1);
+    let column = |name: &str| serde_json::from_value::<Vec<f64>>(row[name].clone()).unwrap();
+    let ends: Vec<_> = topology.constraints.iter().map(|one| f64::from(one.b)).collect();
+    let lengths: Vec<_> =
+        topology.constraints.iter().map(|one| f64::from(one.rest_length)).collect();
+    assert_eq!((column("b"), row["revision"].as_u64()), (ends, Some(0)));
+    assert!(column("rest_length").iter().zip(&lengths).all(|(a, b)| (a - b).abs() < 1e-7));
+    client.subscribe(2, "/surface");
+    assert_eq!(client.json(2)["triangles"].as_array().unwrap().len(), 3 * 13 * 11 * 2);
+    // Another scene is sent to the subscribers.
+    client.advertise(1, "/commands");
+    client.subscribe(3, "/colliders");
+    client.publish(1, &json!({ "kind": "load", "scene": "ragdoll" }));
+    let row = client.json(1);
+    assert_eq!(row["a"].as_array().unwrap().len(), 20, "{row}");
+    assert_eq!(client.json(2)["triangles"], json!([]));
+    while client.json(3)["colliders"].as_array().is_none_or(Vec::is_empty) {}
+}
+
+#[test]
+fn a_push_of_a_client_moves_the_particles_in_its_sphere() {
+    let mut setup = Setup::start(&["--allow-commands"]);
+    let (mut client, _) = Client::start(&setup.url);
+    client.advertise(1, "/commands");
+    let [x, y, z] = setup.particles()[90].position;
+    let push =
+        json!({ "kind": "push", "center": [x, y, z], "radius": 0.05, "delta": [0, 0, 0.05] });
+    client.publish(1, &push);
+    client.publish(1, &json!({ "kind": "step", "count": 1 }));
+    setup.wait_for_particle(90, |particle| particle.position[2] > z + 0.02);
+}
+
+#[test]
 fn a_particle_follows_the_grab_of_a_client_and_is_released_when_the_client_disconnects() {
     let mut setup = Setup::start(&["--allow-commands"]);
     let (mut client, _) = Client::start(&setup.url);
@@ -198,7 +236,9 @@ fn the_official_client_decodes_the_published_state() {
     let rotation = &transform["rotation"];
     let half = std::f64::consts::FRAC_1_SQRT_2;
     assert_eq!((&rotation["x"], &rotation["w"]), (&json!(half), &json!(half)), "y becomes z");
-    let topics = "/colliders /outcomes /particles /scene /status /steps /tears /tf".split(' ');
+    let topics =
+        "/colliders /outcomes /particles /scene /status /steps /surface /tears /tf /topology"
+            .split(' ');
     let topics: Vec<_> = topics.map(Value::from).collect();
     assert_eq!(report["topics"], json!(topics));
 }

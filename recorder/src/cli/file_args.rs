@@ -5,7 +5,9 @@ use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
 use anyhow::bail;
-use recorder::{Compression, Existing, LogOptions, LogWriter, PartFile, RunDescription};
+use recorder::{
+    Compression, ContentSelection, Existing, LogOptions, LogWriter, PartFile, RunDescription,
+};
 use sim_contract::part_path;
 
 /// The option to replace existing files.
@@ -86,16 +88,16 @@ impl FileArgs {
         Ok(PartFile::create(path, self.overwrite.existing())?)
     }
 
-    /// Starts the recording in the file. `log_time_ns` is the current wall clock.
+    /// Starts the recording of a simulation in the file.
     pub(crate) fn begin(
         &self,
         file: PartFile,
+        selection: ContentSelection,
         run: &RunDescription,
         scene: &[u8],
-        log_time_ns: u64,
     ) -> anyhow::Result<LogFile> {
-        let options = self.options();
-        Ok(LogWriter::create(file, options, run, scene, log_time_ns)?)
+        let options = LogOptions { selection, ..self.options() };
+        Ok(LogWriter::create(file, options, run, scene, 0)?)
     }
 }
 

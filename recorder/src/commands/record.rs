@@ -19,7 +19,7 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use anyhow::{anyhow, bail};
-use recorder::PartFile;
+use recorder::{PartFile, Topic};
 use sim_contract::clock::{SECOND_NS, monotonic_ns, realtime_ns, sleep_until};
 use sim_contract::{
     AttachError, Endpoint, LockstepError, SNAPSHOTS_BUFFERED, Stop, Tap, console, report_bus_errors,
@@ -71,10 +71,13 @@ pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
     let signal = UserSignal::install()?;
     let trigger = args.black_box.map(|span| Trigger::new(span, signal.clone()));
     PartFile::check(&names.path(0), args.file.existing())?;
-    let Some(tap) = attach(args, &endpoint, &stop)? else {
+    let Some(mut tap) = attach(args, &endpoint, &stop)? else {
         bail!("nothing was recorded: no node has come up as {endpoint}");
     };
     let selection = args.selection.selection();
+    if selection.has_topic(Topic::Forces) {
+        tap.read_forces()?;
+    }
     let queue_bytes = usize::try_from(args.queue_bytes).unwrap_or(usize::MAX / 2);
     let options = WriteOptions {
         selection,

@@ -9,7 +9,9 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use clap::error::ErrorKind;
 use recorder::simulation::{Job, SimulationResult, State, States, simulate};
-use recorder::{Closing, LogEnd, LogReader, OutcomeRow, PartFile, TimedCommand, WriteError};
+use recorder::{
+    Closing, ContentSelection, LogEnd, LogReader, OutcomeRow, PartFile, TimedCommand, WriteError,
+};
 use serde::Serialize;
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{Stop, printable_line};
@@ -39,6 +41,7 @@ const STEPS_PER_UPDATE: u64 = 256;
     step, or recording truncated or damaged.\n\nExamples:\n  \
     recorder simulate curtain --steps 24000\n  \
     recorder simulate curtain --steps 2400 -o drag.mcap --commands drag.jsonl\n  \
+    recorder simulate rope --steps 480 -o rope.mcap --forces\n  \
     recorder simulate flight.mcap -o run.mcap\n  \
     recorder simulate run.mcap --drop 3 --set 480:damping=0.1 -o changed.mcap\n  \
     recorder simulate live.mcap --steps 2400 --commands live.mcap -o again.mcap"
@@ -65,6 +68,9 @@ pub(crate) struct SimulateArgs {
     #[arg(long, value_name = "STEP:PARAMETER=VALUE", conflicts_with = "steps",
         allow_hyphen_values = true, value_parser = parse_setting)]
     set: Vec<TimedCommand>,
+    /// Record the forces on colliders, anchors and fixed particles in each step, too (/forces)
+    #[arg(long)]
+    forces: bool,
     #[command(flatten)]
     threads: ThreadArgs,
     #[command(flatten)]
@@ -97,6 +103,11 @@ pub(crate) fn run(args: &SimulateArgs) -> anyhow::Result<Exit> {
             with_usage(&clap::Error::raw(ErrorKind::MissingRequiredArgument, text))
         }
         None if args.has_changes() => run_changed(args, &stop),
+        None if args.forces => {
+            let text = "--forces needs --steps, --drop, --set or --commands: a recording that is simulated without \
+                        changes keeps the forces that it has\n";
+            with_usage(&clap::Error::raw(ErrorKind::MissingRequiredArgument, text))
+        }
         None => run_recording(args, &stop),
     }
 }
@@ -174,6 +185,7 @@ fn run_job<E: From<WriteError> + Into<anyhow::Error>>(
     stop: &Stop,
 ) -> anyhow::Result<Exit> {
     states.solver.set_threads(args.threads.count());
+    states.solver.compute_forces(args.forces && args.output.is_some());
     let output = args.output.as_deref();
     let mut log = output.map(|path| begin(args, path, job, &states.solver)).transpose()?;
     let first_step = job.start.step;
@@ -245,8 +257,10 @@ fn truncation(args: &SimulateArgs) -> String {
 
 fn begin(args: &SimulateArgs, path: &Path, job: &Job, solver: &Solver) -> anyhow::Result<LogFile> {
     let file = args.file.create(path)?;
+    let selection = ContentSelection::default();
+    let selection = if args.forces { selection.with_forces() } else { selection };
     args.file
-        .begin(file, &job.description(solver), job.scene.to_toml().as_bytes(), 0)
+        .begin(file, selection, &job.description(solver), job.scene.to_toml().as_bytes())
         .with_context(|| truncation(args))
 }
 

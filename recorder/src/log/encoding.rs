@@ -13,8 +13,8 @@ use sim_contract::ParticleState;
 
 use super::message::Message;
 use super::rows::{
-    CollidersRow, EventRow, OutcomeRow, ParametersRow, StatusRow, StepRow, SurfaceRow, TearsRow,
-    TopologyRow,
+    CollidersRow, EventRow, ForcesRow, OutcomeRow, ParametersRow, StatusRow, StepRow, SurfaceRow,
+    TearsRow, TopologyRow,
 };
 use super::topic::Topic;
 use descriptor::{FRAME_TRANSFORM, KEYFRAME, POINT_CLOUD, SCENE_UPDATE, file_descriptor_set};
@@ -53,6 +53,7 @@ impl TopicFormat {
             Topic::Colliders => json_format::<CollidersRow>("catenary.Colliders"),
             Topic::Tears => json_format::<TearsRow>("catenary.Tears"),
             Topic::Parameters => json_format::<ParametersRow>("catenary.Parameters"),
+            Topic::Forces => json_format::<ForcesRow>("catenary.Forces"),
             Topic::Outcomes => json_format::<OutcomeRow>("catenary.Outcome"),
             Topic::Status => json_format::<StatusRow>("catenary.Status"),
             Topic::Events => json_format::<EventRow>("catenary.Event"),
@@ -104,6 +105,7 @@ impl MessageEncoder {
             Message::Colliders(row) => json(row, scratch)?,
             Message::Tears(row) => json(row, scratch)?,
             Message::Parameters(row) => json(row, scratch)?,
+            Message::Forces(row) => json(row, scratch)?,
             Message::Outcome(row) => json(row, scratch)?,
             Message::Status(row) => json(row, scratch)?,
             Message::Event(row) => json(row, scratch)?,

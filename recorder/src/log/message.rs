@@ -3,8 +3,8 @@
 use sim_contract::ParticleState;
 
 use super::rows::{
-    ColliderRow, CollidersRow, EventRow, OutcomeRow, ParametersRow, StatusRow, StepRow, SurfaceRow,
-    TearsRow, TopologyRow,
+    ColliderRow, CollidersRow, EventRow, ForcesRow, OutcomeRow, ParametersRow, StatusRow, StepRow,
+    SurfaceRow, TearsRow, TopologyRow,
 };
 use super::topic::Topic;
 
@@ -21,6 +21,8 @@ pub enum Message {
     Tears(TearsRow),
     /// The parameters from a step on.
     Parameters(ParametersRow),
+    /// The impulses of a step.
+    Forces(ForcesRow),
     /// The part of the solver's state after a step that the particles lack.
     Keyframe {
         /// The step of the snapshot that this completes.
@@ -57,6 +59,7 @@ impl Message {
             Self::Colliders(_) => Topic::Colliders,
             Self::Tears(_) => Topic::Tears,
             Self::Parameters(_) => Topic::Parameters,
+            Self::Forces(_) => Topic::Forces,
             Self::Keyframe { .. } => Topic::Keyframe,
             Self::Outcome(_) => Topic::Outcomes,
             Self::Status(_) => Topic::Status,
@@ -74,6 +77,7 @@ impl Message {
             Self::Colliders(row) => row.step,
             Self::Tears(row) => row.step,
             Self::Parameters(row) => row.step,
+            Self::Forces(row) => row.step,
             Self::Outcome(row) => row.step,
             Self::Status(row) => row.step,
             Self::Event(row) => row.step,
@@ -98,6 +102,7 @@ impl Message {
             Self::Tears(row) => {
                 size_of_val(row.constraints.as_slice()) + row.causes.len() * TEAR_CAUSE_SIZE_BYTES
             }
+            Self::Forces(row) => row.size_bytes(),
             Self::Keyframe { bytes, .. } => bytes.len(),
             Self::Particles { particles, .. } => size_of_val(particles.as_slice()),
             Self::Outcome(row) => row.status.len() + row.reason.len(),

@@ -2,6 +2,7 @@
 
 mod colliders;
 mod event;
+mod forces;
 mod json;
 mod outcome;
 mod parameters;
@@ -12,6 +13,7 @@ mod topology;
 
 pub use colliders::{ColliderRow, CollidersRow, ShapeRow};
 pub use event::EventRow;
+pub use forces::{AnchorForceRow, ColliderForceRow, ForcesRow};
 pub use outcome::OutcomeRow;
 pub use parameters::ParametersRow;
 pub use status::StatusRow;

@@ -10,7 +10,7 @@ use sim_contract::{ELEMENTS_MAX, LoadHeader};
 use sim_solver::scene::Up;
 
 use super::rows::TopologyRow;
-use super::topic::{AllCounts, Topic};
+use super::topic::{AllCounts, Topic, TopicCounts};
 
 /// Version of the topics, rows and metadata in a file.
 ///
@@ -180,6 +180,10 @@ impl Closing {
             (UNREADABLE.to_owned(), self.unreadable.to_string()),
         ]);
         for (topic, counts) in self.counts.iter() {
+            if topic == Topic::Forces && *counts == TopicCounts::default() {
+                // Most recordings have none.
+                continue;
+            }
             let mut put = |field, count: u64| map.insert(key(topic, field), count.to_string());
             put("received", counts.received);
             put("written", counts.written);

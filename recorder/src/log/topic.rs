@@ -18,6 +18,8 @@ pub enum Topic {
     Tears,
     /// [`crate::ParametersRow`]: all parameters at the start and after each change.
     Parameters,
+    /// [`crate::ForcesRow`]: the impulses of each step, where they were asked for.
+    Forces,
     /// catenary.Keyframe: the part of the solver's state that the particles lack, in its encoding.
     Keyframe,
     /// [`crate::OutcomeRow`]: every answered command, in order of application.
@@ -34,13 +36,14 @@ pub enum Topic {
 
 impl Topic {
     /// All topics, in order.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::Tf,
         Self::Topology,
         Self::Surface,
         Self::Colliders,
         Self::Tears,
         Self::Parameters,
+        Self::Forces,
         Self::Keyframe,
         Self::Outcomes,
         Self::Status,
@@ -58,6 +61,7 @@ impl Topic {
             Self::Colliders => "/colliders",
             Self::Tears => "/tears",
             Self::Parameters => "/parameters",
+            Self::Forces => "/forces",
             Self::Keyframe => "/keyframe",
             Self::Outcomes => "/outcomes",
             Self::Status => "/status",

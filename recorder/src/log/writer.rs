@@ -100,8 +100,8 @@ pub struct LogWriter<W: Write> {
     file: Option<Writer<ChunkSink<W>>>,
     sink: SinkHandle,
     run: RunDescription,
-    /// Channel of each topic, in the order of [`Topic::ALL`].
-    channels: [u16; Topic::ALL.len()],
+    /// Channel of each declared topic, in the order of [`Topic::ALL`].
+    channels: Channels,
     encoder: MessageEncoder,
     /// Newest time of reception. Log times never decrease.
     log_time_ns: u64,
@@ -128,7 +128,9 @@ impl<W: Write> LogWriter<W> {
         let sink = out.handle();
         let mut file = write_options(options).create(out)?;
         let selected = write_selection(&mut file, &options.selection);
-        match selected.and_then(|()| write_header(&mut file, run, scene, log_time_ns)) {
+        match selected
+            .and_then(|()| write_header(&mut file, options.selection, run, scene, log_time_ns))
+        {
             Ok(channels) => {
                 let mut counts = AllCounts::default();
                 counts[Topic::Tf].written = 1;
@@ -155,9 +157,9 @@ impl<W: Write> LogWriter<W> {
     /// apart, because viewers show one snapshot at a time.
     ///
     /// # Errors
-    /// If this or an earlier call failed.
+    /// If this or an earlier call failed, or for forces in a recording whose selection lacks them.
     pub fn write(&mut self, message: &Message, log_time_ns: u64) -> Result<(), WriteError> {
-        let header = self.message_header(message.topic(), message.step(), log_time_ns);
+        let header = self.message_header(message.topic(), message.step(), log_time_ns)?;
         let data = self.encoder.encode(message, header.publish_time)?;
         let file = self.file.as_mut().ok_or(WriteError::Stopped)?;
         let result = file.write_to_known_channel(&header, data);
@@ -175,7 +177,7 @@ impl<W: Write> LogWriter<W> {
         mut particles: ParticleBuffer,
         log_time_ns: u64,
     ) -> Result<(), WriteError> {
-        let header = self.message_header(Topic::Particles, step, log_time_ns);
+        let header = self.message_header(Topic::Particles, step, log_time_ns)?;
         let file = self.file.as_mut().ok_or(WriteError::Stopped)?;
         particles.encode_head(header.publish_time);
         let result = self
@@ -189,19 +191,28 @@ impl<W: Write> LogWriter<W> {
         self.sink.take_spare()
     }
 
-    fn message_header(&mut self, topic: Topic, step: u64, log_time_ns: u64) -> MessageHeader {
+    fn message_header(
+        &mut self,
+        topic: Topic,
+        step: u64,
+        log_time_ns: u64,
+    ) -> Result<MessageHeader, WriteError> {
+        let channel_id = self.channels[topic.index()].ok_or_else(|| {
+            let name = topic.name();
+            WriteError::Failed(format!("the selection of the recording lacks {name}"))
+        })?;
         self.log_time_ns = self.log_time_ns.max(log_time_ns);
         if topic == Topic::Particles {
             let after = self.snapshot_log_time_ns.map_or(0, |time_ns| time_ns.saturating_add(1));
             self.log_time_ns = self.log_time_ns.max(after);
             self.snapshot_log_time_ns = Some(self.log_time_ns);
         }
-        MessageHeader {
-            channel_id: self.channels[topic.index()],
+        Ok(MessageHeader {
+            channel_id,
             sequence: low_32_bits(step),
             log_time: self.log_time_ns,
             publish_time: self.run.time_of_step_ns(step),
-        }
+        })
     }
 
     fn count_written(
@@ -352,12 +363,16 @@ fn write_selection<W: Write>(
     Ok(file.write_metadata(&Metadata { name, metadata: selection.to_map() })?)
 }
 
+/// The channel of each topic that a file declares, in the order of [`Topic::ALL`].
+type Channels = [Option<u16>; Topic::ALL.len()];
+
 fn write_header<W: Write>(
     file: &mut Writer<ChunkSink<W>>,
+    selection: ContentSelection,
     run: &RunDescription,
     scene: &[u8],
     log_time_ns: u64,
-) -> Result<[u16; Topic::ALL.len()], WriteError> {
+) -> Result<Channels, WriteError> {
     file.attach(&Attachment {
         log_time: log_time_ns,
         create_time: run.epoch_ns,
@@ -366,14 +381,15 @@ fn write_header<W: Write>(
         data: Cow::Borrowed(scene),
     })?;
     file.write_metadata(&Metadata { name: RUN_METADATA.to_owned(), metadata: run.to_map() })?;
-    let mut channels = [0; Topic::ALL.len()];
-    for topic in Topic::ALL {
-        channels[topic.index()] = add_channel(file, topic)?;
+    let mut channels = [None; Topic::ALL.len()];
+    for topic in selection.declared() {
+        channels[topic.index()] = Some(add_channel(file, topic)?);
     }
     let publish_time = run.time_of_step_ns(0);
-    let channel_id = channels[Topic::Tf.index()];
-    let header = MessageHeader { channel_id, sequence: 0, log_time: log_time_ns, publish_time };
-    file.write_to_known_channel(&header, &encode_transform(publish_time, run.origin, run.up))?;
+    if let Some(channel_id) = channels[Topic::Tf.index()] {
+        let header = MessageHeader { channel_id, sequence: 0, log_time: log_time_ns, publish_time };
+        file.write_to_known_channel(&header, &encode_transform(publish_time, run.origin, run.up))?;
+    }
     Ok(channels)
 }
 

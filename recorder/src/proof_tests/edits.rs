@@ -14,7 +14,8 @@ mod older_format;
 use std::sync::atomic::AtomicBool;
 
 use crate::log::{
-    Closing, LogOptions, LogReader, LogWriter, Message, StatusRow, Topic, parse_commands,
+    Closing, ContentSelection, LogOptions, LogReader, LogWriter, Message, StatusRow, Topic,
+    parse_commands,
 };
 use mcap::records::op;
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader};
@@ -67,14 +68,20 @@ const STEPS: u64 = 4;
 /// A record of a file: its opcode and its bytes.
 type Record = (u8, Vec<u8>);
 
+/// A recording with every topic.
 fn written() -> Vec<u8> {
+    written_with(ContentSelection::default().with_forces())
+}
+
+fn written_with(selection: ContentSelection) -> Vec<u8> {
     let scene = Scene::from_toml(SCENE, "edits.toml").unwrap();
     let commands = parse_commands(COMMANDS, "test").unwrap();
     let job = Job::new(scene, commands, STEPS);
-    let solver = Solver::new(&job.scene);
+    let mut solver = Solver::new(&job.scene);
+    solver.compute_forces(selection.has_topic(Topic::Forces));
     let (run, scene) = (job.description(&solver), job.scene.to_toml());
-    let mut log =
-        LogWriter::create(Vec::new(), LogOptions::default(), &run, scene.as_bytes(), 0).unwrap();
+    let options = LogOptions { selection, ..LogOptions::default() };
+    let mut log = LogWriter::create(Vec::new(), options, &run, scene.as_bytes(), 0).unwrap();
     let status = StatusRow::from(&NodeStatus { step: 0, ..NodeStatus::default() });
     log.write(&Message::Status(status), 0).unwrap();
     simulate(&job, States::first(solver), Some(&mut log), &AtomicBool::new(false), |_| {}).unwrap();
@@ -87,7 +94,7 @@ fn written() -> Vec<u8> {
 /// Writes other messages into the recording of the same run.
 fn rewritten(file: &[u8], messages: &[Message]) -> Vec<u8> {
     let log = LogReader::new(file).unwrap();
-    let options = LogOptions::default();
+    let options = LogOptions { selection: log.selection(), ..LogOptions::default() };
     let mut new = LogWriter::create(Vec::new(), options, log.run(), log.scene(), 0).unwrap();
     for message in messages {
         new.write(message, 0).unwrap();

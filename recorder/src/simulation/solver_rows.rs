@@ -1,7 +1,7 @@
-//! Rows of `/colliders` and `/tears`, from the state of a solver.
+//! Rows of `/colliders`, `/tears` and `/forces`, from the state of a solver.
 
-use crate::log::{CollidersRow, TearsRow};
-use sim_contract::ColliderState;
+use crate::log::{AnchorForceRow, ColliderForceRow, CollidersRow, ForcesRow, TearsRow};
+use sim_contract::{ColliderState, PlainF32};
 use sim_solver::{PlacedCollider, Solver};
 
 /// Returns the colliders after `step`.
@@ -33,4 +33,26 @@ pub(crate) fn newest_tears_row(solver: &Solver, step: u64, count: usize) -> Tear
 fn state(collider: &PlacedCollider) -> ColliderState {
     let PlacedCollider { shape, restitution, friction, velocity, angular_velocity } = *collider;
     ColliderState { restitution, friction, velocity, angular_velocity, ..shape.fields().into() }
+}
+
+/// Returns the forces of the last step, which is `step`, if the solver computes them.
+pub fn forces_row(solver: &Solver, step: u64) -> Option<ForcesRow> {
+    let forces = solver.forces()?;
+    let plain = |vector: [f32; 3]| vector.map(PlainF32);
+    let colliders = forces.colliders.iter().map(|one| ColliderForceRow {
+        impulse: plain(one.impulse.linear),
+        angular_impulse: plain(one.impulse.angular),
+        contacts: one.contacts,
+    });
+    let anchors = forces.anchors.iter().map(|one| AnchorForceRow {
+        impulse: plain(one.linear),
+        angular_impulse: plain(one.angular),
+    });
+    Some(ForcesRow {
+        step,
+        colliders: colliders.collect(),
+        anchors: anchors.collect(),
+        particles: forces.particles.iter().map(|one| one.particle).collect(),
+        impulses: forces.particles.iter().map(|one| plain(one.impulse)).collect(),
+    })
 }

@@ -11,7 +11,7 @@ use sim_solver::Solver;
 
 use super::frozen::{FrozenParticles, FrozenTracker};
 use super::job::{Job, count};
-use super::solver_rows::{colliders_row, new_tears_row};
+use super::solver_rows::{colliders_row, forces_row, new_tears_row};
 
 /// The time of the next keyframe.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -29,6 +29,7 @@ pub(super) struct StateWriter<'a, W: Write> {
     /// The outcomes of the next step.
     pub(super) outcomes: Vec<OutcomeRow>,
     outcome_count: u64,
+    first_step: u64,
     /// The last written row.
     colliders: CollidersRow,
     /// The last written values.
@@ -59,6 +60,7 @@ impl<'a, W: Write> StateWriter<'a, W> {
             run,
             outcomes: Vec::new(),
             outcome_count: job.start.outcome_count,
+            first_step: job.start.step,
             // A scene without colliders has no row.
             colliders: CollidersRow { step: 0, colliders: Vec::new() },
             parameters: None,
@@ -85,6 +87,12 @@ impl<'a, W: Write> StateWriter<'a, W> {
             self.log.write(&Message::Tears(row), time_ns)?;
         }
         self.write_parameters(solver, step)?;
+        // No step has led to the first state.
+        if step > self.first_step
+            && let Some(row) = forces_row(solver, step)
+        {
+            self.log.write(&Message::Forces(row), time_ns)?;
+        }
         if is_second || keyframe == KeyframeDue::Now {
             let bytes = solver.keyframe().encode();
             self.log.write(&Message::Keyframe { step, bytes }, time_ns)?;

@@ -108,8 +108,7 @@ impl Verification {
         let is_older_format = !log.is_current_format();
         let has_numbers = log.format_version() >= NUMBERED_VERSION;
         let selection = log.selection();
-        let left_out =
-            Topic::ALL.into_iter().filter(|topic| !selection.has_topic(*topic)).collect();
+        let left_out = selection.left_out().collect();
         let coverage = Coverage { is_older_format, left_out, ..Coverage::default() };
         Ok(Self {
             run_id: RunId::new(log.scene()),

@@ -301,10 +301,21 @@ impl Resimulation {
         updates.into_iter().find_map(|update| {
             let what = match update {
                 Message::Outcome(row) => return self.add_outcome(row),
+                Message::Forces(row) if row.step > self.step => {
+                    self.compute_forces();
+                    self.side_rows.add(update, &self.solver, self.step)
+                }
                 _ => self.side_rows.add(update, &self.solver, self.step),
             }?;
             Some(SnapshotFinding::at_step(update.step(), what))
         })
+    }
+
+    /// Computes the forces of the next steps, which the recording has.
+    fn compute_forces(&mut self) {
+        if self.solver.forces().is_none() {
+            self.solver.compute_forces(true);
+        }
     }
 
     fn add_outcome(&mut self, row: &OutcomeRow) -> Option<SnapshotFinding> {

@@ -2,11 +2,11 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use crate::log::{CollidersRow, EventRow, Message, ParametersRow, TearsRow};
-use sim_contract::{ParameterValues, ParticleFlags, ParticleState};
+use crate::log::{CollidersRow, EventRow, ForcesRow, Message, ParametersRow, TearsRow};
+use sim_contract::{ForceKind, ForceRow, ParameterValues, ParticleFlags, ParticleState};
 use sim_solver::{Keyframe, Solver};
 
-use crate::simulation::solver_rows::{colliders_row, newest_tears_row};
+use crate::simulation::solver_rows::{colliders_row, forces_row, newest_tears_row};
 
 /// Rows that were read but not compared yet, by step.
 #[derive(Debug, Default)]
@@ -15,6 +15,7 @@ pub(super) struct SideRows {
     colliders: BTreeMap<u64, CollidersRow>,
     /// A paused node may change parameters several times before a step.
     parameters: BTreeMap<u64, VecDeque<ParametersRow>>,
+    forces: BTreeMap<u64, ForcesRow>,
     keyframes: BTreeMap<u64, Vec<u8>>,
     events: BTreeMap<u64, Vec<EventRow>>,
     /// Step of the newest compared keyframe.
@@ -53,6 +54,7 @@ impl SideRows {
                 rows.push_back(row.clone());
                 is_new
             }
+            Message::Forces(row) => self.forces.insert(row.step, row.clone()).is_none(),
             Message::Keyframe { step, bytes } => {
                 self.keyframes.insert(*step, bytes.clone()).is_none()
             }
@@ -83,6 +85,7 @@ impl SideRows {
             Message::Tears(_)
             | Message::Colliders(_)
             | Message::Parameters(_)
+            | Message::Forces(_)
             | Message::Keyframe { .. } => {
                 let topic = update.topic().name();
                 Some(format!(
@@ -98,6 +101,7 @@ impl SideRows {
         self.tears.retain(|one, _| *one > step);
         self.colliders.retain(|one, _| *one > step);
         self.parameters.retain(|one, _| *one > step);
+        self.forces.retain(|one, _| *one > step);
         self.keyframes.retain(|one, _| *one > step);
         self.events.retain(|one, _| *one > step);
         self.keyframe_step = Some(step);
@@ -108,6 +112,7 @@ impl SideRows {
         self.tears.len()
             + self.colliders.len()
             + self.parameters.values().map(VecDeque::len).sum::<usize>()
+            + self.forces.len()
             + self.keyframes.len()
             + self.events.values().map(Vec::len).sum::<usize>()
     }
@@ -132,6 +137,8 @@ impl SideRows {
         self.tears.clear();
         self.events.clear();
         let count = self.count();
+        // Those of the first state depend on the step that led to it.
+        self.forces.clear();
         let newest = self.colliders.pop_last();
         self.colliders = newest.into_iter().map(|(_, row)| (step, row)).collect();
         let newest = self.parameters.pop_last().and_then(|(_, mut rows)| rows.pop_back());
@@ -176,6 +183,7 @@ impl SideRows {
         let tears = self.tears.remove(&step).and_then(|row| compare_tears(&row, solver));
         let colliders = self.colliders.remove(&step);
         let parameters = self.parameters.remove(&step).unwrap_or_default();
+        let forces = self.forces.remove(&step);
         let keyframe = self.keyframes.remove(&step);
         let events = self.events.remove(&step).unwrap_or_default();
         if keyframe.is_some() {
@@ -184,6 +192,7 @@ impl SideRows {
         tears
             .or_else(|| colliders.and_then(|row| compare_colliders(&row, solver)))
             .or_else(|| parameters.iter().find_map(|row| compare_parameters(row, solver)))
+            .or_else(|| forces.and_then(|row| compare_forces(&row, solver)))
             .or_else(|| keyframe.and_then(|bytes| compare_keyframe(&bytes, solver)))
             .or_else(|| events.iter().find_map(|row| compare_event(row, solver)))
     }
@@ -253,6 +262,40 @@ fn compare_parameters(recorded: &ParametersRow, solver: &Solver) -> Option<Strin
         "/parameters: parameter {name}: recorded {:?}, simulated {:?}",
         old.value, new.value
     ))
+}
+
+/// Compares the impulses of a step.
+fn compare_forces(recorded: &ForcesRow, solver: &Solver) -> Option<String> {
+    if let Some(problem) = recorded.problem() {
+        return Some(format!("its message on /forces: {problem}"));
+    }
+    let simulated = forces_row(solver, recorded.step)?;
+    let (old, new) = (recorded.rows(), simulated.rows());
+    let differs = |place: &usize| {
+        let [old, new] = [old.get(*place), new.get(*place)];
+        old.map(bytemuck::bytes_of) != new.map(bytemuck::bytes_of)
+    };
+    let place = (0..old.len().max(new.len())).find(differs)?;
+    let [recorded, simulated] = [old.get(place), new.get(place)].map(force_text);
+    Some(format!("its forces in /forces: recorded {recorded}, simulated {simulated}"))
+}
+
+/// Returns text such as "particle 13 [0.0, -0.5, 0.0] N s".
+fn force_text(row: Option<&ForceRow>) -> String {
+    let Some(row) = row else { return "none".to_owned() };
+    let kind = row.kind().map_or("unknown", ForceKind::name);
+    let ForceRow { index, impulse, angular_impulse, contacts, .. } = *row;
+    match row.kind() {
+        Some(ForceKind::Collider) => {
+            format!(
+                "{kind} {index} {impulse:?} N s, {angular_impulse:?} N m s, {contacts} contacts"
+            )
+        }
+        Some(ForceKind::Anchor) => {
+            format!("{kind} {index} {impulse:?} N s, {angular_impulse:?} N m s")
+        }
+        _ => format!("{kind} {index} {impulse:?} N s"),
+    }
 }
 
 fn compare_colliders(recorded: &CollidersRow, solver: &Solver) -> Option<String> {

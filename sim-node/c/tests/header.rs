@@ -2,6 +2,7 @@
 //! update it after a change: `UPDATE_GOLDEN=1 cargo test -p sim-c --test header`
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -229,4 +230,24 @@ fn the_header_compiles_as_c99_without_a_warning() {
 fn the_headers_compile_as_cpp17_without_a_warning() {
     compile("c++", "-std=c++17", "catenary.h");
     compile("c++", "-std=c++17", "catenary.hpp");
+}
+
+/// Returns the words after `catenary_` that begin a call, as in `catenary_attach(`.
+fn functions(header: &str) -> BTreeSet<String> {
+    let is_code = |line: &&str| !line.trim_start().starts_with(['*', '/', '#']);
+    let code = header.lines().filter(is_code).filter(|line| !line.contains("typedef"));
+    let names = code.filter_map(|line| line.split_once('(')?.0.split([' ', '*']).next_back());
+    names.filter(|name| name.starts_with("catenary_")).map(str::to_owned).collect()
+}
+
+#[allow(clippy::disallowed_methods, reason = "a test starts the lister of symbols")]
+#[test]
+fn the_library_exports_the_functions_of_the_header_and_nothing_else() {
+    let header = std::fs::read_to_string(folder().join("include/catenary.h")).unwrap();
+    let library = std::env::current_exe().unwrap().with_file_name("libcatenary.so");
+    let output = Command::new("nm").args(["-D", "--defined-only"]).arg(&library).output().unwrap();
+    assert!(output.status.success(), "{}", library.display());
+    let listed = String::from_utf8(output.stdout).unwrap();
+    let exported = listed.lines().filter_map(|line| line.split(' ').nth(2));
+    assert_eq!(exported.map(str::to_owned).collect::<BTreeSet<_>>(), functions(&header));
 }

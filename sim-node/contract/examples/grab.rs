@@ -1,4 +1,4 @@
-//! Grabs a particle and moves it around a circle: `cargo run -p sim-contract --example grab -- 7`
+//! Grabs a particle and moves it around a level circle of 0.6 m: `cargo run -p sim-contract --example grab -- 7`
 //!
 //! It is particle 7 here, particle 0 without an argument. The circle takes two seconds; then the
 //! particle is released. `--domain` and `--name` select the simulation.
@@ -10,6 +10,8 @@ use sim_contract::{Action, Client, Endpoint, GRAB_OVER_S_DEFAULT};
 
 const TIMEOUT: Duration = Duration::from_secs(1);
 const MOVES: u16 = 120;
+/// Radius of the circle, in m. It leaves the plane of a curtain, which so swings back and does not turn over.
+const RADIUS: f32 = 0.3;
 
 fn main() -> ExitCode {
     let Err(error) = run() else { return ExitCode::SUCCESS };
@@ -38,7 +40,8 @@ fn run() -> Result<(), Box<dyn Error>> {
         let due = step + u64::from(rate_hz / 60).saturating_sub(1);
         while client.latest_snapshot(TIMEOUT)?.ok_or("the node is paused")?.header().step < due {}
         let angle = TAU * f32::from(index) / f32::from(MOVES);
-        let target = [start[0] + angle.sin(), start[1] + 1.0 - angle.cos(), start[2]];
+        let (x, z) = (RADIUS * angle.sin(), RADIUS * (1.0 - angle.cos()));
+        let target = [start[0] + x, start[1], start[2] + z];
         step = client.request(Action::Move { particle, target, over_s }, TIMEOUT)?.step;
     }
     let release = client.request(Action::Release { particle, force: false }, TIMEOUT)?;

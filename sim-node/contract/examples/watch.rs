@@ -37,6 +37,8 @@ fn watch() -> Result<(), Box<dyn Error>> {
         let (step, count) = (snapshot.header().step, particles.len());
         let heights = particles.iter().map(|particle| particle.position[1]).enumerate();
         let Some((index, y)) = heights.min_by(|(_, a), (_, b)| a.total_cmp(b)) else { continue };
+        // Millimetres, without a sign of zero.
+        let y = (y * 1e3).round() / 1e3 + 0.0;
         println!("step {step}: {count} particles, lowest {index} at y = {y:.3} m");
     }
     Ok(())

@@ -2,6 +2,7 @@
 
 pub(crate) mod arrivals;
 pub(crate) mod change;
+mod forces;
 pub(crate) mod loaded_scene;
 pub(crate) mod lockstep;
 pub(crate) mod membership;
@@ -16,10 +17,11 @@ pub(crate) mod watch;
 
 use std::time::Duration;
 
+use crate::client::forces::{ForcesReader, Search};
 use crate::client::lockstep::{LockstepError, Member};
 use crate::client::request::{Commander, RequestError, random_client_id};
 use crate::client::torn::Torn;
-use crate::client::views::{Colliders, Parameters, Snapshot, Surface, Topology};
+use crate::client::views::{Colliders, Forces, Parameters, Snapshot, Surface, Topology};
 use crate::client::watch::Watch;
 use crate::endpoint::Endpoint;
 use crate::messages::collider::{ColliderState, CollidersHeader};
@@ -57,6 +59,7 @@ pub struct Client {
     tears: Option<Latch<TornConstraint, TearsHeader>>,
     parameters: Option<Latch<ParameterState, ParametersHeader>>,
     colliders: Option<Latch<ColliderState, CollidersHeader>>,
+    forces: Option<ForcesReader>,
     status: Option<ValueReader<NodeStatus>>,
     commander: Option<Commander>,
     member: Option<Member>,
@@ -97,6 +100,7 @@ impl Client {
             tears: None,
             parameters: None,
             colliders: None,
+            forces: None,
             status: None,
             commander: None,
             member: None,
@@ -227,6 +231,40 @@ impl Client {
             }))
         })?;
         Ok(colliders.unwrap_or_default())
+    }
+
+    /// Returns the newest forces on colliders, anchors and fixed particles. Waits only if none have arrived.
+    ///
+    /// The owner computes them only while a client reads them, so the first call waits for the next step, and a
+    /// paused node has none for a reader that comes then. From the first call on, each step costs the owner a
+    /// little more time. In the lockstep, call it once with no timeout before the first turn.
+    ///
+    /// # Errors
+    /// Same as [`Client::topology`].
+    pub fn forces(&mut self, timeout: Duration) -> Result<Option<Forces>, ReadError> {
+        let services = &self.attachment.services;
+        let reader = get_or_create(&mut self.forces, || ForcesReader::create(services))?;
+        self.watch.wait_for(&self.attachment, timeout, || reader.newest())
+    }
+
+    /// Returns the forces of the step of a snapshot, which are published before it. `None` if there are none: the
+    /// snapshot is from before the first call, or more than [`crate::SNAPSHOTS_BUFFERED`] steps old, or forces of a later
+    /// step were read. Call it for snapshots in their order.
+    ///
+    /// # Errors
+    /// Same as [`Client::topology`].
+    pub fn forces_of(
+        &mut self,
+        snapshot: &SnapshotHeader,
+        timeout: Duration,
+    ) -> Result<Option<Forces>, ReadError> {
+        let services = &self.attachment.services;
+        let reader = get_or_create(&mut self.forces, || ForcesReader::create(services))?;
+        let search = self.watch.wait_for(&self.attachment, timeout, || reader.of_step(snapshot))?;
+        Ok(match search {
+            Some(Search::Found(forces)) => Some(forces),
+            Some(Search::Passed) | None => None,
+        })
     }
 
     /// Returns the newest unread status, or waits for the next one.

@@ -34,6 +34,7 @@
 //! | colliders | [`ColliderState`]s; [`CollidersHeader`] | per load, on a change, and each step while one moves |
 //! | tears | [`TornConstraint`]s; [`TearsHeader`] | per load, on a tear and on a reset: all constraints torn since |
 //! | parameters | [`ParameterState`]s; [`ParametersHeader`] | per load and on a change: all values |
+//! | forces | [`ForceRow`]s; [`ForcesHeader`] | after every step while a client reads them: the impulses on colliders, anchors and fixed particles |
 //! | commands | [`Command`] | by clients |
 //! | outcomes | [`Outcome`] | for every command |
 //! | status | [`NodeStatus`] | ten times a second, and after a change of the lockstep |
@@ -64,7 +65,7 @@ pub use client::restoring::SentState;
 pub use client::state::State;
 pub use client::tap::Tap;
 pub use client::torn::Torn;
-pub use client::views::{Colliders, Parameters, Snapshot, Surface, Topology};
+pub use client::views::{Colliders, Forces, Parameters, Snapshot, Surface, Topology};
 pub use domain::Domain;
 pub use domain::config_file::{ConfigFile, ConfigFileError};
 pub use domain::nodes::{ListedNode, NodeAnswer};
@@ -77,6 +78,7 @@ pub use files::text_file::{TextFileError, read_scene_file};
 pub use limits::*;
 pub use messages::collider::{ColliderState, CollidersHeader};
 pub use messages::command::{CONSOLE_CLIENT_ID, Command, CommandOptions};
+pub use messages::forces::{ForceKind, ForceRow, ForcesHeader};
 pub use messages::member_changes::{MemberChange, MemberChangeKind, MemberChanges};
 pub use messages::outcome::{
     OUTCOME_FLAG_CONTROL, OUTCOME_FLAG_DISCONNECTED, OUTCOME_FLAG_NEW_RUN, Outcome, OutcomeStatus,

@@ -2,6 +2,7 @@
 
 pub(crate) mod collider;
 pub(crate) mod command;
+pub(crate) mod forces;
 pub(crate) mod member_changes;
 pub(crate) mod outcome;
 pub(crate) mod parameters;

@@ -2,6 +2,7 @@
 
 mod claim;
 pub(crate) mod error;
+mod forces;
 pub(crate) mod load;
 pub(crate) mod preparation;
 mod repetition;
@@ -353,10 +354,11 @@ impl Owner {
         if self.repetition.is_due() {
             self.repetition.publish_next(&self.services, &self.writers);
         }
-        let reader_count = self.total_reader_count();
+        let reader_count = self.services.reader_count() + reader_count(&self.status_service);
         if reader_count != self.last_reader_count.replace(reader_count) {
             self.wakes_due.set(WAKES_PER_READER);
         }
+        self.end_unread_forces();
         self.outcomes.refresh();
         self.status.refresh();
         self.writers.refresh();
@@ -392,20 +394,6 @@ impl Owner {
         let mut files = unfinished::static_files(config, self.session.endpoint.name());
         files.extend(unfinished::node_files(config, self.session.node_id()));
         files.into_iter().find(|path| !path.exists())
-    }
-
-    fn total_reader_count(&self) -> usize {
-        let services = &self.services;
-        reader_count(&services.particles)
-            + reader_count(&services.keyframe)
-            + reader_count(&services.topology)
-            + reader_count(&services.surface)
-            + reader_count(&services.scene)
-            + reader_count(&services.tears)
-            + reader_count(&services.parameters)
-            + reader_count(&services.colliders)
-            + reader_count(&services.outcomes)
-            + reader_count(&self.status_service)
     }
 }
 

@@ -1,6 +1,7 @@
 //! The values that a program exchanges with nodes, simulations and recordings.
 
 pub(crate) mod action;
+pub(crate) mod forces;
 pub(crate) mod outcome;
 pub(crate) mod scene;
 pub(crate) mod snapshot;

@@ -2,11 +2,10 @@
 //!
 //! It wraps the client, the solver and the reader of recordings in Python classes. Particles stay where
 //! they are: arrays are views of shared memory, or of the memory of a [`data::snapshot::Snapshot`]. Every call
-//! that waits or computes lets other threads of the interpreter run. A signal ends the waits for snapshots and
-//! outcomes and the steps of a simulation early; joining the lockstep and putting a state in place last for their
-//! timeout at most.
+//! that waits or computes lets other threads of the interpreter run, and a signal such as Ctrl-C ends it early.
 
 mod arguments;
+mod attach;
 mod convert;
 mod data;
 mod error;
@@ -21,8 +20,12 @@ mod verification;
 /// Registers the classes. Their texts are those of `_catenary.pyi`; a test compares them.
 #[pyo3::pymodule]
 mod _catenary {
+    use pyo3::prelude::*;
+
     #[pymodule_export]
     use crate::data::action::Action;
+    #[pymodule_export]
+    use crate::data::forces::{AnchorForces, ColliderForces, Forces};
     #[pymodule_export]
     use crate::data::outcome::Outcome;
     #[pymodule_export]
@@ -41,4 +44,9 @@ mod _catenary {
     use crate::simulation::Simulation;
     #[pymodule_export]
     use crate::verification::{Verification, verify};
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        crate::process::watch_forks(module)
+    }
 }

@@ -210,7 +210,7 @@ impl Lockstep {
         }
         let snapshot = node.show(py, snapshot)?;
         for outcome in outcomes {
-            Outcome(outcome).require_applied(py)?;
+            Outcome::new(&outcome).require_applied(py)?;
         }
         Ok(Some(snapshot))
     }
@@ -218,7 +218,7 @@ impl Lockstep {
     /// Outcomes that came with the last snapshot.
     #[getter]
     fn outcomes(&self) -> Vec<Outcome> {
-        self.progress().outcomes.iter().copied().map(Outcome).collect()
+        self.progress().outcomes.iter().map(Outcome::new).collect()
     }
 
     /// Sends an action for the next step. Returns its sequence number.

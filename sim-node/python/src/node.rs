@@ -6,24 +6,27 @@ use std::time::Duration;
 use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
-use recorder::{CollidersRow, StatusRow};
+use recorder::{CollidersRow, ForcesRow, StatusRow};
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{
-    AttachError, Client, Endpoint, GivenState, OwnerState, ParticleState, ReadError, RequestError,
+    Client, Endpoint, GivenState, OwnerState, ParticleState, ReadError, Reason, RequestError,
     SnapshotHeader,
 };
 
 use crate::arguments;
+use crate::attach::attach;
 use crate::convert::{from_json, motion};
 use crate::data::action::Action;
-use crate::data::outcome::Outcome;
+use crate::data::forces::Forces;
+use crate::data::outcome::{Outcome, indices};
 use crate::data::scene::{Topology, corners};
 use crate::data::snapshot::Snapshot;
 use crate::data::state::{State, current_state};
 use crate::error::{
-    NotRunning, Timeout, TooManySnapshots, attach_error, endpoint_error, read_error, request_error,
+    Error, NotRunning, Timeout, TooManySnapshots, endpoint_error, read_error, request_error,
+    with_timeout,
 };
-use crate::patience::{PART, Patience, wait};
+use crate::patience::{Patience, wait};
 use crate::process::OfProcess;
 
 /// Longest wait for messages that a node has published once per load, in seconds.
@@ -94,6 +97,21 @@ impl Node {
         }))
     }
 
+    /// Returns the allowed indices after the rejection of an unknown one, if the node tells them.
+    fn allowed_indices(&self, py: Python<'_>, reason: Option<Reason>) -> Option<String> {
+        let status = || self.latched(py, Client::status).ok();
+        let count = match reason? {
+            Reason::UnknownParticle => status()?.particle_count as usize,
+            Reason::UnknownConstraint => status()?.constraint_count as usize,
+            Reason::UnknownCollider => {
+                let read = |client: &mut Client, part| client.colliders(part).map(Some);
+                self.latched(py, read).ok()?.colliders.len()
+            }
+            _ => return None,
+        };
+        Some(indices(count))
+    }
+
     /// Reads what the node has published once.
     fn latched<T: Send>(
         &self,
@@ -152,35 +170,6 @@ impl Node {
         drop(replaced);
         Ok(snapshot)
     }
-}
-
-/// Attaches to a node, or waits for it.
-fn attach(
-    py: Python<'_>,
-    endpoint: &Endpoint,
-    client_id: Option<u64>,
-    timeout_s: f64,
-) -> PyResult<Client> {
-    let patience = Patience::new(Some(timeout_s))?;
-    loop {
-        let attached = py.detach(|| match client_id {
-            Some(client_id) => Client::attach_as(endpoint, client_id),
-            None => Client::attach(endpoint),
-        });
-        let is_absent =
-            matches!(attached, Err(AttachError::NoNode { .. } | AttachError::NoServices { .. }));
-        match attached {
-            Ok(client) => return Ok(client),
-            Err(_) if is_absent && !patience.is_over() => py.detach(|| pause(patience.part())),
-            Err(error) => return Err(attach_error(&error)),
-        }
-        py.check_signals()?;
-    }
-}
-
-fn pause(time: Duration) {
-    let time_ns = u64::try_from(time.as_nanos()).unwrap_or(u64::MAX);
-    sim_contract::clock::sleep_until(monotonic_ns().saturating_add(time_ns));
 }
 
 #[pymethods]
@@ -326,6 +315,39 @@ impl Node {
         from_json(py, &row.map_or_else(Vec::new, |row| row.colliders))
     }
 
+    /// Returns the newest forces on colliders, anchors and fixed particles. Waits only if none have arrived.
+    ///
+    /// The node computes them only while a client reads them: the first call waits for the next step, and from then
+    /// on each step costs the node a little more time, until `close`. A paused node has none until its next step, and
+    /// a replay only those of a recording that was made with `--forces`.
+    ///
+    /// Raises `Timeout` if there are none in time.
+    #[pyo3(signature = (timeout=5.0))]
+    fn forces(&self, py: Python<'_>, timeout: Option<f64>) -> PyResult<Forces> {
+        let read = |client: &mut Client, part| client.forces(part).map_err(|e| read_error(&e));
+        match self.read(py, Patience::new(timeout)?, read)? {
+            Some(forces) => show_forces(py, &forces),
+            None if self.is_running(py)? => Err(Timeout::new_err(format!(
+                "{} publishes no forces: is it paused (forces are those of a step), or a replay of a recording \
+                 without them (`recorder record --forces`)?",
+                self.endpoint
+            ))),
+            None => Err(self.silence(py)?),
+        }
+    }
+
+    /// Returns the forces of the step of a snapshot, without waiting, or None if this connection has none.
+    ///
+    /// It has those since the first call of `forces` or `forces_of`, up to 64 steps back. Call it for snapshots in
+    /// their order: forces before the last read ones are gone.
+    fn forces_of(&self, py: Python<'_>, snapshot: &Snapshot) -> PyResult<Option<Forces>> {
+        let forces = self.call(py, |client| {
+            let forces = client.forces_of(snapshot.header(), Duration::ZERO);
+            forces.map_err(|error| read_error(&error))
+        })?;
+        forces.map(|forces| show_forces(py, &forces)).transpose()
+    }
+
     /// Sends an action without waiting. Returns its sequence number, for `outcome`.
     fn send(&self, py: Python<'_>, action: &Action) -> PyResult<u64> {
         let action = action.0;
@@ -362,7 +384,10 @@ impl Node {
                 Err(error) => Err(request_error(&error)),
             })?;
         match (outcome, last) {
-            (Some(outcome), _) => Ok(Outcome(outcome)),
+            (Some(outcome), _) => {
+                let allowed = self.allowed_indices(py, outcome.reason());
+                Ok(Outcome::new(&outcome).with_allowed(allowed))
+            }
             (None, Some(error)) => Err(request_error(&with_timeout(error, timeout))),
             (None, None) => Err(self.silence(py)?),
         }
@@ -439,26 +464,18 @@ impl Node {
     }
 }
 
+fn show_forces(py: Python<'_>, forces: &sim_contract::Forces) -> PyResult<Forces> {
+    let unknown =
+        || Error::new_err("the node publishes forces of another version: update it or this module");
+    let row = ForcesRow::new(forces.header.step, &forces.rows).ok_or_else(unknown)?;
+    Forces::new(py, &row, forces.header.rate_hz)
+}
+
 /// Returns `true` for a snapshot that its node has published just now. One from the future has the clock of
 /// another host, so its age is unknown.
 fn is_recent(header: &SnapshotHeader) -> bool {
     let age_ns = monotonic_ns().checked_sub(header.publish_monotonic_ns);
     age_ns.is_some_and(|age_ns| age_ns < SECOND_NS / 2)
-}
-
-/// Returns the error of the last part of a wait as that of the whole wait.
-fn with_timeout(error: RequestError, timeout_s: Option<f64>) -> RequestError {
-    let total = timeout_s.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
-    let total = total.unwrap_or(PART);
-    match error {
-        RequestError::Timeout { sequence, owner, .. } => {
-            RequestError::Timeout { sequence, timeout: total, owner }
-        }
-        RequestError::OutcomesMissed { sequence, missed_count, .. } => {
-            RequestError::OutcomesMissed { sequence, timeout: total, missed_count }
-        }
-        other => other,
-    }
 }
 
 impl Drop for Node {

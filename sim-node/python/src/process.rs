@@ -1,11 +1,33 @@
 //! Values that belong to the process that made them.
 
-use std::process;
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 use crate::error::Error;
+
+/// Number of forks between the process that loaded the module and this one. To ask the system for the id of the
+/// process would cost as much as an array.
+static FORKS: AtomicU32 = AtomicU32::new(0);
+
+/// Counts forks from now on.
+pub(crate) fn watch_forks(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    let py = module.py();
+    let arguments = PyDict::new(py);
+    arguments.set_item("after_in_child", wrap_pyfunction!(count_fork, module)?)?;
+    py.import("os")?.call_method("register_at_fork", (), Some(&arguments)).map(|_| ())
+}
+
+#[pyfunction]
+fn count_fork() {
+    FORKS.fetch_add(1, Ordering::Relaxed);
+}
+
+fn forks() -> u32 {
+    FORKS.load(Ordering::Relaxed)
+}
 
 /// A locked value with threads, or with ports in shared memory. A fork copies it, but neither its threads nor
 /// its place at other processes: the copy must not be used, locked or released.
@@ -15,16 +37,17 @@ pub(crate) struct OfProcess<T> {
     value: Mutex<Option<T>>,
     /// Name in errors.
     name: &'static str,
-    process_id: u32,
+    /// [`FORKS`] in its process.
+    forks: u32,
 }
 
 impl<T> OfProcess<T> {
     pub(crate) fn new(name: &'static str, value: T) -> Self {
-        Self { value: Mutex::new(Some(value)), name, process_id: process::id() }
+        Self { value: Mutex::new(Some(value)), name, forks: forks() }
     }
 
     fn is_foreign(&self) -> bool {
-        self.process_id != process::id()
+        self.forks != forks()
     }
 
     /// Calls a function with the value.

@@ -1,7 +1,7 @@
 //! Recordings, from which snapshots are read at any step.
 
 use std::error::Error as StdError;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use numpy::{PyArray1, PyArray2};
@@ -9,13 +9,14 @@ use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use recorder::{
-    LogReader, Message, ReadError, RunDescription, StepRow, Tape, TapeError, TapeState,
-    complete_state,
+    ForcesRow, FrameReader, LogReader, Message, ReadError, RunDescription, StepRow, Tape,
+    TapeError, TapeState, complete_state,
 };
 use sim_contract::SnapshotHeader;
 
 use crate::arguments;
 use crate::convert::from_json;
+use crate::data::forces::Forces;
 use crate::data::scene::{Topology, corners};
 use crate::data::snapshot::Snapshot;
 use crate::data::state::State;
@@ -76,9 +77,40 @@ impl Recording {
         recording_error(&self.path, error)
     }
 
+    fn require_step(&self, step: u64) -> PyResult<()> {
+        let (first, last) = self.with(|tape| Ok((tape.first_step(), tape.last_step())))?;
+        if (first..=last).contains(&step) {
+            return Ok(());
+        }
+        let path = self.path();
+        let message = format!("{path} has no step {step} (it has {first} to {last})");
+        Err(PyKeyError::new_err(message))
+    }
+
     fn malformed(&self, topic: &str) -> PyErr {
         RecordingError::new_err(format!("{}: {topic} is malformed", self.path()))
     }
+}
+
+/// Returns the forces of a step, if the file has them.
+fn forces_at(path: &Path, tape: &mut Tape, step: u64) -> Result<Option<ForcesRow>, ReadError> {
+    let mut frames = FrameReader::new(LogReader::open(path)?);
+    if step > tape.first_step() {
+        tape.wind(&mut frames, step - 1)?;
+    }
+    while let Some(frame) = frames.next_frame()? {
+        for update in frame.updates {
+            if let Message::Forces(row) = update
+                && row.step == step
+            {
+                return Ok(Some(row));
+            }
+        }
+        if frame.row.step >= step {
+            break;
+        }
+    }
+    Ok(None)
 }
 
 /// Returns the header of a recorded snapshot.
@@ -108,7 +140,7 @@ impl Recording {
     #[new]
     fn new(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
         // Without an index, the whole file is scanned.
-        let tape = run_until_signal(py, |_| Tape::open(&path, None, &mut |_, _| ()))?;
+        let tape = run_until_signal(py, |stop| Tape::open(&path, Some(stop), &mut |_, _| ()))?;
         let tape = tape.map_err(|error| recording_error(&path, &error))?;
         Ok(Self { path, tape: Mutex::new(Some(tape)) })
     }
@@ -219,6 +251,27 @@ impl Recording {
         Ok(PyArray1::from_iter(py, state.torn.indices()))
     }
 
+    /// Returns the forces of a step on colliders, anchors and fixed particles.
+    ///
+    /// Raises `KeyError` for a step before the first or after the last one, and `RecordingError` if the file has no
+    /// forces of the step: it was made without `--forces`, or no step has led to its first state.
+    fn forces(
+        &self,
+        py: Python<'_>,
+        #[pyo3(from_py_with = arguments::step)] step: u64,
+    ) -> PyResult<Forces> {
+        self.require_step(step)?;
+        let row = self.read(py, |tape| forces_at(&self.path, tape, step))?;
+        let row = row.ok_or_else(|| {
+            RecordingError::new_err(format!(
+                "{} has no forces of step {step}: `recorder record --forces` and `recorder simulate --forces` \
+                 write those of each step but the first",
+                self.path()
+            ))
+        })?;
+        Forces::new(py, &row, self.rate()?)
+    }
+
     /// Returns a table of all recorded steps, by column: `pandas.DataFrame(recording.steps())`.
     fn steps<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let rows = self.scan(py, |message| match message {
@@ -259,12 +312,7 @@ impl Recording {
         py: Python<'_>,
         #[pyo3(from_py_with = arguments::step)] step: u64,
     ) -> PyResult<State> {
-        let (first, last) = self.with(|tape| Ok((tape.first_step(), tape.last_step())))?;
-        if !(first..=last).contains(&step) {
-            let path = self.path();
-            let message = format!("{path} has no step {step} (it has {first} to {last})");
-            return Err(PyKeyError::new_err(message));
-        }
+        self.require_step(step)?;
         let state = run_until_signal(py, |signal| {
             self.with(|tape| {
                 let state = complete_state(&self.path, tape, step, u64::MAX, signal);

@@ -6,7 +6,7 @@ use std::sync::{Mutex, PoisonError};
 use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
-use recorder::simulation::colliders_row;
+use recorder::simulation::{colliders_row, forces_row};
 use recorder::{RunDescription, constraint_state};
 use sim_contract::clock::monotonic_ns;
 use sim_contract::{LoadHeader, ParticleState, SnapshotHeader, Triangle, scene_hash};
@@ -15,12 +15,13 @@ use sim_solver::{Applied, Control, Reason, SOLVER_VERSION, Scene, Solver};
 use crate::arguments;
 use crate::convert::{from_json, motion};
 use crate::data::action::Action;
-use crate::data::outcome::rejected;
+use crate::data::forces::Forces;
+use crate::data::outcome::{cause, indices, rejected};
 use crate::data::scene::{Topology, corners, load_scene, scene_error};
 use crate::data::snapshot::{POSITION, Snapshot, VELOCITY};
 use crate::data::state::State;
 use crate::data::view;
-use crate::error::StateError;
+use crate::error::{Error, StateError};
 use crate::patience::PART;
 use crate::process::OfProcess;
 
@@ -90,8 +91,9 @@ impl Simulation {
         py.detach(|| self.running.with(call))
     }
 
-    fn with_threads(scene: Scene, threads: usize) -> PyResult<Self> {
+    fn with_threads(scene: Scene, threads: usize, forces: bool) -> PyResult<Self> {
         let mut solver = Solver::new(&scene);
+        solver.compute_forces(forces);
         solver.set_threads(threads);
         let scene_hash = scene_hash(scene.to_toml().as_bytes());
         let running = Running { solver, step: 0, is_changed: false };
@@ -101,17 +103,31 @@ impl Simulation {
         };
         Ok(Self { scene, scene_hash, running })
     }
+
+    /// Returns the number of elements of which a rejected command has named an unknown one.
+    fn count(&self, py: Python<'_>, reason: Reason) -> PyResult<Option<usize>> {
+        Ok(Some(match reason {
+            Reason::UnknownParticle => self.__len__(py)?,
+            Reason::UnknownConstraint => {
+                self.with(py, |running| Ok(running.solver.constraints().count()))?
+            }
+            Reason::UnknownAnchor => self.scene.anchors.len(),
+            Reason::UnknownCollider => self.scene.colliders.len(),
+            _ => return Ok(None),
+        }))
+    }
 }
 
 #[pymethods]
 impl Simulation {
     #[new]
-    #[pyo3(signature = (scene=None, threads=1, *, toml=None))]
+    #[pyo3(signature = (scene=None, threads=1, *, toml=None, forces=false))]
     fn new(
         py: Python<'_>,
         scene: Option<PathBuf>,
         #[pyo3(from_py_with = arguments::threads)] threads: usize,
         toml: Option<&str>,
+        forces: bool,
     ) -> PyResult<Self> {
         py.detach(|| {
             let scene = match (scene, toml) {
@@ -121,7 +137,7 @@ impl Simulation {
                 }
                 _ => return Err(PyTypeError::new_err("give either a scene or `toml`")),
             };
-            Self::with_threads(scene, threads)
+            Self::with_threads(scene, threads, forces)
         })
     }
 
@@ -159,8 +175,10 @@ impl Simulation {
             Ok(_) => return Ok(()),
             Err(reason) => reason,
         };
-        let action = serde_json::to_string(&action).unwrap_or_default();
-        Err(rejected(py, format!("rejected: {reason}: {action}"), Some(reason), None))
+        let count = self.count(py, reason)?;
+        let allowed = count.map(indices).or_else(|| action.allowed_values(reason));
+        let message = format!("rejected: {}", cause(Some(reason), allowed.as_deref(), &action));
+        Err(rejected(py, message, Some(reason), None))
     }
 
     /// Returns a copy of the current state.
@@ -247,6 +265,21 @@ impl Simulation {
         from_json(py, &row.colliders)
     }
 
+    /// Returns the forces of the last step on colliders, anchors and fixed particles: all 0 before the first step, and
+    /// in a step that put a state in place.
+    ///
+    /// Raises `Error` for a simulation that was made without `forces=True`.
+    fn forces(&self, py: Python<'_>) -> PyResult<Forces> {
+        let row = self.with(py, |running| {
+            forces_row(&running.solver, running.step).ok_or_else(|| {
+                Error::new_err(
+                    "this simulation computes no forces: make it with `Simulation(..., forces=True)`",
+                )
+            })
+        })?;
+        Forces::new(py, &row, self.rate())
+    }
+
     /// Returns the complete state, which `restore` puts in place again.
     ///
     /// Raises `StateError` between a command and the step that shows it.
@@ -294,6 +327,7 @@ impl Simulation {
         self.with(py, |running| {
             let mut solver = Solver::new(&self.scene);
             solver.set_threads(running.solver.threads());
+            solver.compute_forces(running.solver.forces().is_some());
             (running.solver, running.is_changed) = (solver, false);
             Ok(())
         })

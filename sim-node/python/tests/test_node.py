@@ -143,6 +143,26 @@ def test_commands_return_their_outcome_or_raise_with_the_reason(start_node: Star
         assert error.value.outcome is not None and error.value.outcome.reason == reason
 
 
+def test_a_rejection_names_the_allowed_values(start_node: StartNode) -> None:
+    node = start_node("curtain", "--paused")
+    simulation = catenary.Simulation("curtain")
+    rejected: list[tuple[catenary.Action, str]] = [
+        (catenary.Action.pin(168), "0 to 167"),
+        (catenary.Action.cut(596), "0 to 595"),
+        (catenary.Action.move_collider(0, (0, 0, 0)), "none, because there is none"),
+        (catenary.Action.set("dampness", 1), "gravity, damping, .*"),
+        (catenary.Action.set("damping", float("nan")), "finite numbers"),
+        (catenary.Action.set("damping", -1), "a number >= 0, or off for 0"),
+        (catenary.Action.grab(3, (0, 0, 0), 0.3), "coordinates within 1e7, .* over 0 to 0.25 s"),
+    ]
+    for action, allowed in rejected:
+        message = rf"^rejected.*: .* \(allowed: {allowed}\): {{"
+        with pytest.raises(catenary.Rejected, match=message):
+            node.request(action)
+        with pytest.raises(catenary.Rejected, match=message):
+            simulation.apply(action)
+
+
 def test_many_commands_are_sent_before_the_first_answer(start_node: StartNode) -> None:
     node = start_node("curtain", "--paused")
     with pytest.raises(catenary.Rejected, match="no such particle"):

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import signal
+import struct
 import subprocess
 import time
 from collections.abc import Callable
@@ -11,7 +13,8 @@ from pathlib import Path
 import catenary
 import numpy as np
 import pytest
-from conftest import DEADLINE, StartNode
+from conftest import DEADLINE, Interrupt, StartNode
+from edits import MAGIC, records
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
@@ -44,7 +47,7 @@ def test_snapshots_are_those_that_the_mcap_reader_finds(recording: catenary.Reco
 def test_a_step_a_time_and_a_slice_select_snapshots(recording: catenary.Recording) -> None:
     assert (recording.first_step, recording.last_step, recording.rate) == (0, 600, 240)
     assert recording[480].step == recording.at(2.0).step == 480
-    assert recording.at(2.0041).step == 480 and recording.at(1e9).step == 600
+    assert recording.at(2.0041).step == 480 and recording.at(2.5).step == 600
     assert [one.step for one in recording[10:50:10]] == [10, 20, 30, 40]
     assert [one.step for one in recording[598:]] == [598, 599, 600]
     assert 480 in recording and 601 not in recording and 2**70 not in recording
@@ -54,8 +57,9 @@ def test_a_step_a_time_and_a_slice_select_snapshots(recording: catenary.Recordin
     for key in (slice(-3, None), slice(None, None, -1)):
         with pytest.raises(ValueError):
             recording[key]
-    with pytest.raises(ValueError):
-        recording.at(-1.0)
+    for time_s in (-1.0, 2.5042, 1e9, float("nan")):
+        with pytest.raises(ValueError, match=r"allowed: 0 to 2.5 seconds"):
+            recording.at(time_s)
 
 
 def test_a_recording_becomes_arrays(recording: catenary.Recording) -> None:
@@ -65,6 +69,15 @@ def test_a_recording_becomes_arrays(recording: catenary.Recording) -> None:
     assert arrays.positions.shape == arrays.velocities.shape == (3, 168, 3)
     assert np.array_equal(arrays.positions[1], recording[150].positions)
     assert arrays.hashes[2] == recording[200].hash
+
+
+def test_arrays_of_no_snapshot_are_refused_with_the_recorded_steps(
+    recording: catenary.Recording,
+) -> None:
+    for start, stop in ((50, 10), (601, 700)):
+        with pytest.raises(ValueError, match=rf"steps from {start} up to .* \(it has 0 to 600\)"):
+            recording.to_numpy(start, stop)
+    assert list(recording[50:10]) == []
 
 
 def test_steps_and_outcomes_are_tables(recording: catenary.Recording) -> None:
@@ -166,3 +179,26 @@ def test_unreadable_files_are_named(tmp_path: Path) -> None:
     text.write_text("plain text")
     with pytest.raises(catenary.RecordingError, match="text.mcap"):
         catenary.open(text)
+
+
+def sparse_record(size: int) -> bytes:
+    """Begins a record that readers skip. Its content is a hole in the file, which takes no space on the disk."""
+    return struct.pack("<BQ", 0x80, size)
+
+
+def test_ctrl_c_ends_the_reading_of_a_large_file(
+    simulate: Simulate, interrupt: Interrupt, tmp_path: Path
+) -> None:
+    data = simulate("pendulum", "--steps", "2", "--compression", "none").read_bytes()
+    size = 1 << 42  # Reading it takes minutes.
+    header_end = next(at for at, opcode, _ in records(data, MAGIC) if opcode != 1)
+    data_end = next(at for at, opcode, _ in records(data, MAGIC) if opcode == 15)
+    for at, setup, call in (
+        (header_end, "", "catenary.open(path)"),
+        (data_end, "recording = catenary.open(path)", "recording.steps()"),
+        (data_end, "recording = catenary.open(path)", "recording.outcomes()"),
+    ):
+        path = tmp_path / "large.mcap"
+        path.write_bytes(data[:at] + sparse_record(size))
+        os.truncate(path, at + 9 + size)
+        assert interrupt(call, f"path = {str(path)!r}\n{setup}") == "interrupted\n", call

@@ -48,7 +48,7 @@ impl Solver {
         if self.has_flag(index, ParticleFlags::PINNED) {
             return Ok(());
         }
-        self.particles.change_flags(index, ParticleFlags::PINNED, 0);
+        self.change_flags(index, ParticleFlags::PINNED, 0);
         // A grabbed particle follows its grab, and stops where it is released.
         if !self.has_flag(index, ParticleFlags::GRABBED) {
             self.particles.stop(index);
@@ -65,7 +65,7 @@ impl Solver {
     pub fn unpin(&mut self, particle: u32) -> Result<(), Reason> {
         let index = self.find_unfrozen(particle)?;
         if self.has_flag(index, ParticleFlags::PINNED) {
-            self.particles.change_flags(index, 0, ParticleFlags::PINNED);
+            self.change_flags(index, 0, ParticleFlags::PINNED);
             self.due.tethers = true;
         }
         Ok(())
@@ -90,7 +90,7 @@ impl Solver {
             Ok(place) => self.grabs[place] = active,
             Err(place) => self.grabs.insert(place, active),
         }
-        self.particles.change_flags(index, ParticleFlags::GRABBED, 0);
+        self.change_flags(index, ParticleFlags::GRABBED, 0);
         self.update_root(index);
         Ok(())
     }
@@ -128,12 +128,18 @@ impl Solver {
         let index = self.find_unfrozen(particle)?;
         let place = self.find_grab(particle).map_err(|_| Reason::NotGrabbed)?;
         self.grabs.remove(place);
-        self.particles.change_flags(index, 0, ParticleFlags::GRABBED);
+        self.change_flags(index, 0, ParticleFlags::GRABBED);
         if self.has_flag(index, ParticleFlags::PINNED) {
             self.particles.stop(index);
         }
         self.update_root(index);
         Ok(())
+    }
+
+    /// Sets and clears flags of a particle.
+    fn change_flags(&mut self, index: usize, set: u32, clear: u32) {
+        self.particles.change_flags(index, set, clear);
+        self.locate_forces();
     }
 
     /// Marks the tethers as out of date if a particle starts or stops being a root: a grabbed

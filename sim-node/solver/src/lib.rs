@@ -54,6 +54,7 @@ pub use sim_types::{
     ParameterValues, ParticleFlags, Reason, TearCause,
 };
 pub use solver::Solver;
+pub use state::forces::{ColliderImpulse, Forces, FrameImpulse, ParticleImpulse};
 pub use state::keyframe::{Keyframe, KeyframeError};
 pub use state::particles::Particle;
 pub use state::restore::RestoreError;

@@ -21,6 +21,7 @@ use crate::scene::definition::anchor::SceneAnchor;
 use crate::scene::definition::contact::ContactMode;
 use crate::scene::definition::settings::{SolverSettings, substep_length};
 use crate::scene::model::Model;
+use crate::state::forces::{Forces, Measured, Measurement};
 use crate::state::hash::state_hash;
 use crate::state::particles::{Particle, Particles};
 use crate::state::tear::Torn;
@@ -75,6 +76,8 @@ pub struct Solver {
     /// Number of frozen particles, which their flags tell as well.
     pub(crate) frozen_count: u64,
     pub(crate) state_hash: u64,
+    /// None while nobody asks for forces.
+    pub(crate) measurement: Option<Box<Measurement>>,
 }
 
 /// Derived state that is out of date. It is updated once per boundary, however many commands
@@ -131,6 +134,7 @@ impl Solver {
             has_new_tethers: false,
             is_put_in_place: false,
             frozen_count: 0,
+            measurement: None,
             offered: None,
             model: Arc::new(model),
         };
@@ -180,6 +184,7 @@ impl Solver {
         self.scene_step = 0;
         self.is_put_in_place = true;
         self.frozen_count = 0;
+        self.locate_forces();
     }
 
     /// Updates derived state after the commands of a boundary, once for all of them. A caller that
@@ -194,6 +199,12 @@ impl Solver {
         if tethers {
             self.derive_tethers();
             self.has_new_tethers = true;
+        }
+        if let Some(measurement) = &mut self.measurement {
+            measurement.is_located &= !tethers;
+            let states = &self.particles.states;
+            let measured = Measured { model: &self.model, states, tethers: &self.tethers };
+            measurement.locate(&mut self.store, &measured);
         }
     }
 
@@ -218,6 +229,14 @@ impl Solver {
         }
     }
 
+    /// Lets the next boundary find again where forces are measured: other particles are fixed, or something has
+    /// moved in memory.
+    pub(crate) fn locate_forces(&mut self) {
+        if let Some(measurement) = &mut self.measurement {
+            measurement.is_located = false;
+        }
+    }
+
     /// Derives the contacts of particles with each other, if their distance has changed.
     fn derive_particle_contacts(&mut self) {
         let thickness = self.parameters.contact_thickness;
@@ -231,6 +250,7 @@ impl Solver {
 
     /// Updates the locations of particles after a change of the layout.
     fn follow_particles(&mut self) {
+        self.locate_forces();
         self.particle_contacts.locate(&self.store);
         self.tethers.attach(&mut self.store, &self.particles);
     }
@@ -421,6 +441,23 @@ impl Solver {
     /// Returns the colliders at their poses after the last step, in the order of the scene.
     pub fn colliders(&self) -> impl Iterator<Item = PlacedCollider> + '_ {
         self.colliders.iter().map(Collider::placed)
+    }
+
+    /// Computes the forces of each further step, or no longer. They are no part of the state, and change no bit
+    /// of it.
+    pub fn compute_forces(&mut self, is_on: bool) {
+        if !is_on {
+            self.store.forget_forces();
+            self.measurement = None;
+        } else if self.measurement.is_none() {
+            let measurement = Measurement::new(self.collider_count(), self.anchor_count());
+            self.measurement = Some(Box::new(measurement));
+        }
+    }
+
+    /// Returns the forces of the last step, if they are computed: all 0 in a step that put a state in place.
+    pub fn forces(&self) -> Option<&Forces> {
+        self.measurement.as_ref().map(|measurement| &measurement.forces)
     }
 
     /// Returns true if the last step moved a collider.

@@ -1,5 +1,6 @@
 //! The state of a scene between two steps: particles, torn constraints, keyframes and the hash.
 
+pub(crate) mod forces;
 pub(crate) mod hash;
 pub(crate) mod keyframe;
 pub(crate) mod particles;

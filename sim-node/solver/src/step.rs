@@ -75,6 +75,9 @@ impl Solver {
                     }
                 }
             }
+            if let Some(measurement) = &mut self.measurement {
+                measurement.end_substep(&mut self.store);
+            }
             if stop.load(Ordering::Relaxed) {
                 return false;
             }
@@ -97,7 +100,16 @@ impl Solver {
                 | Stage::Advance => unreachable!("{stage:?} is a stage of a substep"),
             }
         }
+        self.finish_forces();
         true
+    }
+
+    fn finish_forces(&mut self) {
+        let h = self.h();
+        if let Some(measurement) = &mut self.measurement {
+            let states = self.particles.states.as_slice();
+            measurement.end_step(&self.store, (&self.anchors, states), h);
+        }
     }
 
     fn publish_put_in_place(&mut self) {
@@ -109,12 +121,18 @@ impl Solver {
         self.particles.make_zeros_canonical();
         self.finish_tears();
         self.hash();
+        if let Some(measurement) = &mut self.measurement {
+            measurement.clear();
+        }
     }
 
     /// Unpacks the state, and computes the targets of anchors and colliders for the end of the step.
     fn begin_step(&mut self) {
         self.store.unpack(&self.particles.states);
         self.particle_contacts.begin_step(&self.torn);
+        if let Some(measurement) = &mut self.measurement {
+            measurement.begin_step(&mut self.store);
+        }
         self.scene_step += 1;
         let (time_s, dt) = (self.scene_time_s(), self.step_length());
         self.anchors.begin_step(time_s);
@@ -217,6 +235,7 @@ impl Solver {
         let h = self.h();
         let frozen_count = self.store.pack(&mut self.particles.states, h);
         if frozen_count > 0 {
+            self.locate_forces();
             self.frozen_count += frozen_count;
             let states = &self.particles.states;
             self.grabs

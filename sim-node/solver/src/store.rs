@@ -4,11 +4,13 @@
 
 mod bends;
 mod configure;
+mod forces;
 mod graph;
 mod layout;
 mod patch;
 mod paths;
 mod publish;
+mod pulls;
 mod survey;
 mod workers;
 
@@ -19,6 +21,7 @@ pub(crate) use layout::{Configured, Location, SceneFields, TetherPlace};
 use patch::{Patch, SheetFamilies};
 use paths::GraphWork;
 pub(crate) use paths::{Paths, Progress};
+pub(crate) use pulls::{Receivers, TetherEnds};
 use survey::Survey;
 use workers::Workers;
 

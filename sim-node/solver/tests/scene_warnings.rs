@@ -263,5 +263,39 @@ fn a_thickness_that_reaches_second_neighbours_causes_a_warning() {
          spacing",
     );
     assert_eq!(warnings(&contact(0.12)), Vec::<String>::new());
-    assert_eq!(warnings(&format!("{}contact = false\n", contact(0.2))), Vec::<String>::new());
+}
+
+#[test]
+fn a_thickness_that_leaves_room_between_particles_causes_a_warning() {
+    let contact = |thickness: f32, mode: &str| {
+        format!(
+            "gravity = [0, 0, 0]\n[contact]\nmode = \"{mode}\"\nthickness = {thickness}\n{SHEET}"
+        )
+    };
+    assert_warns(
+        &contact(0.02, "particles"),
+        "contact.thickness: 0.02 m is 0.2 times the spacing of generate[0], 0.1 m: other particles pass \
+         between its particles; use at least three quarters of the spacing, or mode = \"surfaces\" for cloth",
+    );
+    assert_eq!(warnings(&contact(0.08, "particles")), Vec::<String>::new());
+    assert_eq!(warnings(&contact(0.02, "surfaces")), Vec::<String>::new());
+    // A figure has gaps between its limbs.
+    let figure = contact(0.1, "particles")
+        .replace(SHEET, "[[generate]]\nshape = \"ragdoll\"\nheight = 1.7\n");
+    assert_eq!(warnings(&figure), Vec::<String>::new());
+}
+
+#[test]
+fn contacts_of_shapes_that_all_refuse_them_cause_a_warning() {
+    let scene = format!(
+        "gravity = [0, 0, 0]\n[contact]\nmode = \"particles\"\nthickness = 0.2\n{SHEET}contact = false\n"
+    );
+    assert_eq!(
+        warnings(&scene),
+        [
+            "contact.mode has no effect: every [[generate]] has contact = false; remove it from those that shall touch"
+        ]
+    );
+    let particle = "[[particle]]\nposition = [5, 5, 5]\n";
+    assert_eq!(warnings(&format!("{scene}{particle}")), Vec::<String>::new());
 }

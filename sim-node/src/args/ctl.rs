@@ -31,6 +31,7 @@ const TIMEOUT_DEFAULT: Duration = Duration::from_secs(5);
         sim-node ctl move-collider 0 0 0.1 -0.2\n  \
         sim-node ctl set gravity 0 -1.6 0\n  \
         sim-node ctl watch\n  \
+        sim-node ctl forces\n  \
         sim-node ctl set tear_force off\n  \
         sim-node ctl load rope\n  \
         sim-node ctl rewind 2s\n  \
@@ -87,6 +88,13 @@ pub(crate) enum QueryVerb {
     /// Print the step and the state hash of the newest snapshot
     #[command(after_help = "Example: sim-node ctl hash --json")]
     Hash,
+    /// Print the forces of a step on colliders, anchors and fixed particles
+    ///
+    /// In N, and torques in N m about the center of the collider or anchor: the contacts of particles with a
+    /// collider, and the pull of constraints on a pinned, grabbed or anchored particle. The node computes them only
+    /// while a program reads them, so a paused one has none until its next step.
+    #[command(after_help = "Examples:\n  sim-node ctl forces\n  sim-node ctl forces --json")]
+    Forces,
     /// Print position, velocity, inverse mass and flags of particles
     #[command(after_help = "Examples:\n  \
         sim-node ctl particles 0 90 167\n  \

@@ -1,6 +1,6 @@
 //! The parameters of `ctl set`: their names, and their values in words.
 
-use sim_contract::{OffMeaning, PARAMETERS, Parameter, ParameterInfo, ParameterValue, ValueForm};
+use sim_contract::{PARAMETERS, Parameter, ParameterInfo, ParameterValue, ValueForm};
 
 /// Parses the name of a parameter. The node judges unknown names; one with a value is two words in one.
 pub(super) fn parameter_name(text: &str) -> Result<String, String> {
@@ -14,7 +14,7 @@ pub(super) fn parameter_name(text: &str) -> Result<String, String> {
     let value = if is_valid { value.to_owned() } else { example(info) };
     Err(format!(
         "name and value are separate words, as in `ctl set {name} {value}` (allowed: {})",
-        allowed_values_of(info)
+        info.allowed_values()
     ))
 }
 
@@ -37,35 +37,9 @@ pub(super) fn parameters_help() -> String {
     PARAMETERS.iter().map(name).collect::<Vec<_>>().join(", ")
 }
 
-/// Allowed values of a parameter, in words.
-pub(crate) fn allowed_values_of(info: &ParameterInfo) -> String {
-    let values = match info.form {
-        ValueForm::Vector => format!("three numbers, each {}, z 0 in 2-D", info.range.text),
-        ValueForm::Number | ValueForm::Whole => info.range.text.to_owned(),
-    };
-    let off = match info.off {
-        OffMeaning::Zero => ", or off for 0",
-        OffMeaning::NoLimit => ", or off for no limit",
-        OffMeaning::Absent => ", or off for none",
-        OffMeaning::NotAllowed | OffMeaning::OwnOfEach => "",
-    };
-    let kind = if info.is_per_kind { ", for one --kind or all" } else { "" };
-    format!("{values}{off}{kind}")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_allowed_values_name_range_off_and_kind() {
-        let text = |parameter: Parameter| allowed_values_of(parameter.info());
-        assert_eq!(text(Parameter::Substeps), "a whole number from 1 to 1000");
-        assert_eq!(text(Parameter::TearForce), "a number > 0, or off for no limit");
-        assert_eq!(text(Parameter::Stiffness), "0 to 1, for one --kind or all");
-        let gravity = "three numbers, each -1e7 to 1e7, z 0 in 2-D, or off for 0";
-        assert_eq!(text(Parameter::Gravity), gravity);
-    }
 
     #[test]
     fn a_value_behind_an_equals_sign_is_refused_with_an_example_and_the_range() {

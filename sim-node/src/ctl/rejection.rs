@@ -2,12 +2,8 @@
 
 use std::time::Duration;
 
-use sim_contract::{
-    Action, Client, OffMeaning, Outcome, PARAMETERS, Parameter, Reason, STEP_WORK_MAX,
-};
+use sim_contract::{Action, Client, Outcome, Parameter, Reason, SnapshotHeader};
 use sim_solver::Scene;
-
-use crate::args::allowed_values_of;
 
 /// Explains a rejection: the meaning of its reason, and the remedy in parentheses where one is known.
 /// Returns `None` if the reason is unknown.
@@ -36,6 +32,11 @@ fn remedy(
         Reason::UnknownStep if is_before_run(action, outcome.step) => {
             return Some(age_of_run(outcome.step, status()?.rate_hz));
         }
+        Reason::UnknownStep => {
+            let snapshot = client.latest_snapshot(timeout).ok().flatten()?;
+            let remedy = age_of_scene(action, outcome.step, snapshot.header());
+            return remedy.or_else(|| fixed_remedy(action, reason));
+        }
         _ => {
             let of_replay = remedy_of_replay(action, reason);
             let mut is_replay = || status().is_some_and(|status| status.is_replay());
@@ -57,6 +58,18 @@ fn is_before_run(action: &Action, step: u64) -> bool {
 fn age_of_run(step: u64, rate_hz: u32) -> String {
     let seconds = step.saturating_sub(1) as f64 / f64::from(rate_hz);
     format!("the run is only {seconds:.2} s old; `ctl rewind --to-step 0` goes to its start")
+}
+
+/// Remedy of a rewind, rejected before `step` was made, to a time before the scene began.
+fn age_of_scene(action: &Action, step: u64, newest: &SnapshotHeader) -> Option<String> {
+    let Action::Rewind { to_step, back_steps } = action else { return None };
+    let back_steps = back_steps.map(|back_steps| step.saturating_sub(1 + u64::from(back_steps)));
+    let first = newest.step.saturating_sub(newest.scene_step);
+    (to_step.or(back_steps)? < first).then(|| {
+        format!(
+            "the scene began at step {first} with a load or reset; `ctl rewind --to-step {first}` goes there"
+        )
+    })
 }
 
 /// Remedy of a rejection by a replay, where it is not that of a node.
@@ -93,12 +106,9 @@ fn allowed_indices(count: usize) -> String {
 /// Remedy that follows from the command alone.
 fn fixed_remedy(action: &Action, reason: Reason) -> Option<String> {
     let remedy = match reason {
-        Reason::UnknownParameter => {
-            return Some(format!("allowed: {}", PARAMETERS.map(|info| info.name).join(", ")));
+        Reason::OutOfRange | Reason::NonFinite | Reason::UnknownParameter => {
+            return Some(format!("allowed: {}", action.allowed_values(reason)?));
         }
-        Reason::OutOfRange => return Some(format!("allowed: {}", allowed_values(action)?)),
-        Reason::NonFinite if has_no_limit(action) => "allowed: finite numbers, or off for no limit",
-        Reason::NonFinite => "allowed: finite numbers",
         Reason::AlreadyTorn => "`ctl reset` restores it",
         Reason::NotGrabbed => "`ctl grab` grabs it",
         Reason::GrabbedByOther => "`ctl release --force` ends that grab",
@@ -114,13 +124,6 @@ fn fixed_remedy(action: &Action, reason: Reason) -> Option<String> {
         | Reason::UnknownCollider => return None,
     };
     Some(remedy.to_owned())
-}
-
-/// Returns `true` if a parameter of this action can be without a limit, which scenes write as `inf`.
-fn has_no_limit(action: &Action) -> bool {
-    let Action::Set { parameter, .. } = action else { return false };
-    Parameter::from_name(parameter.as_str())
-        .is_some_and(|parameter| parameter.info().off == OffMeaning::NoLimit)
 }
 
 /// Condition under which a command has an effect.
@@ -143,64 +146,9 @@ fn missing_condition(action: &Action) -> Option<&'static str> {
     })
 }
 
-/// Allowed values of a command, in words.
-fn allowed_values(action: &Action) -> Option<String> {
-    let values = match action {
-        Action::Set { parameter, constraint_kind, .. } => {
-            let info = Parameter::from_name(parameter.as_str())?.info();
-            let kind =
-                if constraint_kind.is_some() && !info.is_per_kind { ", no --kind" } else { "" };
-            let work = match info.parameter {
-                Parameter::Substeps | Parameter::Iterations => format!(
-                    ", with substeps x (constraints x iterations + particles x (colliders + 1)) at \
-                     most {STEP_WORK_MAX}"
-                ),
-                _ => String::new(),
-            };
-            return Some(format!("{}{work}{kind}", allowed_values_of(info)));
-        }
-        Action::Grab { .. } | Action::Move { .. } => {
-            "coordinates within 1e7, z 0 in 2-D, --over 0 to 0.25"
-        }
-        Action::Push { .. } => {
-            "coordinates and --delta within 1e7, z 0 in 2-D, --radius 0 to 1e7, --limit 0 or more"
-        }
-        Action::CutRadius { .. } => "coordinates within 1e7, z 0 in 2-D, --radius 0 to 1e7",
-        Action::CutSegment { .. } => {
-            "coordinates within 1e7, --direction not 0; in 2-D, z of --from and --to 0"
-        }
-        Action::MoveAnchor { .. } => {
-            "coordinates within 1e7, --rotation not 0; in 2-D, z 0 and a rotation about z"
-        }
-        Action::MoveCollider { .. } => {
-            "coordinates within 1e7, --rotation not 0; in 2-D, z 0 and a rotation about z; for \
-             bounds, no rotation"
-        }
-        Action::Load { .. } => "a scene that the node can read; see its messages",
-        Action::Step { .. } => "1 or more",
-        Action::Mark { .. } => "a text that is not empty",
-        Action::Rewind { .. } => "a step of this run that the node has made",
-        _ => return None,
-    };
-    Some(values.to_owned())
-}
-
 #[cfg(test)]
 mod tests {
-    use sim_contract::{ConstraintKind, KindFilter, ParameterValue, Text};
-
     use super::*;
-
-    #[test]
-    fn a_kind_for_a_parameter_without_kinds_is_named() {
-        let action = Action::Set {
-            parameter: Text::cut("damping"),
-            value: ParameterValue::Number(1.0),
-            constraint_kind: Some(KindFilter::Known(ConstraintKind::Bend)),
-        };
-        let remedy = fixed_remedy(&action, Reason::OutOfRange).unwrap();
-        assert_eq!(remedy, "allowed: a number >= 0, or off for 0, no --kind");
-    }
 
     #[test]
     fn a_rewind_before_the_run_is_told_from_one_to_a_state_that_is_gone() {
@@ -212,23 +160,18 @@ mod tests {
     }
 
     #[test]
-    fn every_action_that_can_be_out_of_range_names_its_values() {
-        for action in Action::samples() {
-            let is_checked = !matches!(
-                action,
-                Action::Pin { .. }
-                    | Action::Unpin { .. }
-                    | Action::Release { .. }
-                    | Action::Pause
-                    | Action::Resume
-                    | Action::Reset
-                    | Action::Cut { .. }
-                    | Action::Restore { .. }
-                    | Action::Unknown { .. }
-            );
-            let remedy = fixed_remedy(&action, Reason::OutOfRange);
-            assert_eq!(remedy.is_some(), is_checked, "{action:?}");
+    fn a_rewind_before_the_load_of_the_scene_names_its_first_step() {
+        let newest = SnapshotHeader { step: 1020, scene_step: 20, ..SnapshotHeader::default() };
+        let remedy = |to_step, back_steps| {
+            age_of_scene(&Action::Rewind { to_step, back_steps }, 1021, &newest)
+        };
+        for (to_step, back_steps) in [(Some(999), None), (None, Some(21)), (None, Some(480))] {
+            let remedy = remedy(to_step, back_steps).unwrap();
+            assert!(remedy.starts_with("the scene began at step 1000 "), "{remedy}");
+            assert!(remedy.contains("`ctl rewind --to-step 1000`"), "{remedy}");
         }
+        assert_eq!(remedy(Some(1000), None), None);
+        assert_eq!(remedy(None, Some(20)), None);
     }
 
     #[test]

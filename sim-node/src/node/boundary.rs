@@ -61,6 +61,7 @@ impl Node {
         for request in turn {
             self.process(request, stop)?;
         }
+        self.publisher.switch_forces(&mut self.solver);
         self.solver.finish_boundary();
         if let Some(spare) = self.solver.withdraw() {
             self.spare = Some(spare);

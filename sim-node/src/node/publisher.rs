@@ -1,5 +1,6 @@
 //! Publishes the state of the solver to other processes.
 
+mod forces;
 mod load;
 pub(super) mod run;
 mod status;
@@ -10,14 +11,15 @@ use anyhow::Context;
 use bytemuck::cast_slice;
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{
-    CONTRACT_VERSION, CollidersHeader, Command, ConnectionId, Endpoint, KeyframeHeader,
-    LoadPreparer, OUTCOME_FLAG_DISCONNECTED, Outcome, Owner, ParameterValues, ParticleState, Ready,
-    Reason, ReceivedCommand, ReceivedState, SnapshotFlags, SnapshotHeader, TearsHeader,
-    TornConstraint, Wake,
+    CONTRACT_VERSION, CollidersHeader, Command, ConnectionId, Endpoint, ForcesHeader,
+    KeyframeHeader, LoadPreparer, OUTCOME_FLAG_DISCONNECTED, Outcome, Owner, OwnerError,
+    ParameterValues, ParticleState, Ready, Reason, ReceivedCommand, ReceivedState, SnapshotFlags,
+    SnapshotHeader, TearsHeader, TornConstraint, Wake,
 };
 use sim_solver::{Applied, PlacedCollider, SOLVER_VERSION, Scene, Solver};
 
 use super::statistics::phases::{Phase, Phases};
+use forces::ForcesPublisher;
 pub(super) use load::LoadMessages;
 pub(crate) use load::shared_memory_bytes;
 use load::{LoadPlace, count, to_collider_state};
@@ -87,6 +89,7 @@ pub(crate) struct Publisher {
     /// A step whose snapshot is published, whatever `every` says.
     included_step: u64,
     colliders: Vec<PlacedCollider>,
+    forces: ForcesPublisher,
     /// Times of the phases of steps, for `bench`.
     pub(crate) phases: Phases,
 }
@@ -127,6 +130,7 @@ impl Publisher {
             since_step: 0,
             included_step: 0,
             colliders: Vec::new(),
+            forces: ForcesPublisher::default(),
             phases: Phases::default(),
         })
     }
@@ -260,6 +264,18 @@ impl Publisher {
         self.owner.wake(Wake::Frame);
         self.phases.end(Phase::Wake);
         Ok(())
+    }
+
+    /// Lets the solver compute the forces from the next step on if a client reads them.
+    pub(crate) fn switch_forces(&mut self, solver: &mut Solver) {
+        self.forces.switch(&self.owner, solver);
+    }
+
+    /// Publishes the forces of a step, if the solver has computed them. Call it before [`Self::publish_step`].
+    pub(crate) fn publish_forces(&mut self, solver: &Solver, step: u64) -> Result<(), OwnerError> {
+        let (run_id, rate_hz) = (self.run_id, self.rate_hz);
+        let header = ForcesHeader { run_id, step, rate_hz, ..ForcesHeader::default() };
+        self.forces.publish(&self.owner, header, solver)
     }
 
     /// Publishes the colliders if they differ from the last published ones.

@@ -1,5 +1,7 @@
 //! The actions that clients ask a node to perform.
 
+mod allowed_values;
+
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::constraint_kind::ConstraintKind;

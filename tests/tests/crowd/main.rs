@@ -50,7 +50,7 @@ impl Setup {
     /// Connects a Foxglove client that has received a step.
     fn foxglove_client(&self) -> Client {
         let (mut client, _) = Client::start(&self.foxglove);
-        assert_eq!(client.topics().len(), 8);
+        assert_eq!(client.topics().len(), 10);
         client.subscribe(1, "/steps");
         client.json(1);
         client

@@ -121,7 +121,7 @@ fn viewers_accept_every_schema_of_a_recording() {
     for (topic, schema) in &schemas {
         assert_eq!(broken_rules(schema), [""; 0], "{}: {schema}", topic.name());
     }
-    assert_eq!(schemas.len(), 9);
+    assert_eq!(schemas.len(), 10);
     for topic in Topic::ALL.iter().filter(|topic| !schemas.contains_key(topic)) {
         let format = TopicFormat::for_topic(*topic);
         assert_eq!((format.encoding, format.schema.encoding), ("protobuf", "protobuf"));
@@ -134,7 +134,8 @@ fn every_row_of_a_simulation_follows_its_schema() {
     let file = sandbox.path("all.mcap");
     let scene = sandbox.write("all.toml", SCENE);
     let commands = sandbox.write("all.jsonl", &commands());
-    let args = ["simulate", &scene, "--commands", &commands, "--steps", "240", "-o", &file];
+    let args =
+        ["simulate", &scene, "--commands", &commands, "--steps", "240", "--forces", "-o", &file];
     Process::run(Program::Recorder, &sandbox, &args).success();
     let counts = validate_rows(&file);
     for topic in row_schemas().into_keys().filter(|topic| *topic != Topic::Status) {

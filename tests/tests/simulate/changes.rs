@@ -17,7 +17,7 @@ fn record_mid_run(sandbox: &Sandbox, file: &str) -> u64 {
     step(sandbox, 200);
     ctl(sandbox, &["grab", "90", "0.5", "-0.2", "0.3", "--over", "0.1"]);
     step(sandbox, 200);
-    ctl(sandbox, &["cut-radius", "0.3", "0.3", "0", "--radius", "0.1"]);
+    ctl(sandbox, &["cut-radius", "0.3", "0.3", "0", "--radius", "0.3"]);
     step(sandbox, 200);
     ctl(sandbox, &["rewind", "--to-step", "600"]);
     step(sandbox, 100);

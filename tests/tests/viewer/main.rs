@@ -178,7 +178,7 @@ fn pages_can_pin_cut_brush_set_step_reset_and_load() {
 /// Checks commands that a live node or the bridge refuses.
 fn check_refusals(page: &mut Page) {
     for (message, reason) in [
-        (json!({ "type": "load", "scene": "/etc/passwd.toml" }), "out_of_range"),
+        (json!({ "type": "load", "scene": "/etc/passwd.toml" }), "unknown_scene"),
         (json!({ "type": "seek", "step": 3 }), "only_replay"),
         (json!({ "type": "step", "count": -3 }), "only_replay"),
         (json!({ "type": "pin", "particle": 100_000 }), "unknown_particle"),

@@ -3,12 +3,14 @@
 use std::collections::VecDeque;
 
 use anyhow::{Context, bail};
-use recorder::{CollidersRow, Frame, Message, RunDescription, StatusRow, SurfaceRow, TopologyRow};
+use recorder::{
+    CollidersRow, ForcesRow, Frame, Message, RunDescription, StatusRow, SurfaceRow, TopologyRow,
+};
 use sim_contract::clock::monotonic_ns;
 use sim_contract::{
-    CONTRACT_VERSION, CollidersHeader, Command, Endpoint, KeyframeHeader, Load, LoadHeader,
-    NodeStatus, OUTCOME_FLAG_CONTROL, Outcome, Owner, OwnerError, ParameterValues, Reason,
-    ReceivedCommand, SnapshotFlags, SnapshotHeader, StatusFlags, TearsHeader, Torn, Wake,
+    CONTRACT_VERSION, CollidersHeader, Command, Endpoint, ForcesHeader, KeyframeHeader, Load,
+    LoadHeader, NodeStatus, OUTCOME_FLAG_CONTROL, Outcome, Owner, OwnerError, ParameterValues,
+    Reason, ReceivedCommand, SnapshotFlags, SnapshotHeader, StatusFlags, TearsHeader, Torn, Wake,
 };
 
 use super::control::Control;
@@ -173,6 +175,7 @@ impl Replay {
 
     fn publish_update(&mut self, update: &Message) -> anyhow::Result<()> {
         match update {
+            Message::Forces(row) => self.publish_forces(row)?,
             Message::Keyframe { step, bytes } => {
                 self.publish_keyframe(*step, bytes)?;
             }
@@ -184,6 +187,20 @@ impl Replay {
             Message::Status(row) => self.status = Some(row.clone()),
             // The other messages are published already, or have no service.
             _ => {}
+        }
+        Ok(())
+    }
+
+    /// Publishes the forces of a step while a client reads them.
+    fn publish_forces(&self, row: &ForcesRow) -> anyhow::Result<()> {
+        if self.owner.forces_reader_count() > 0 {
+            let header = ForcesHeader {
+                run_id: self.run_id,
+                step: row.step,
+                rate_hz: self.run.rate_hz,
+                ..ForcesHeader::default()
+            };
+            self.owner.publish_forces(header, &row.rows())?;
         }
         Ok(())
     }

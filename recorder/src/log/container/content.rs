@@ -17,7 +17,7 @@ use crate::log::read::gaps::GapCounter;
 use crate::log::read::limits::SizeLimits;
 use crate::log::read::read_error::ReadError;
 use crate::log::read::reader::read_run;
-use crate::log::rows::{StepRow, TearsRow};
+use crate::log::rows::{ForcesRow, StepRow, TearsRow};
 use crate::log::run::RunDescription;
 use crate::log::run::selection::ContentSelection;
 use crate::log::state_hash::hash_bytes;
@@ -209,6 +209,7 @@ impl ContentCheck {
                 Keyframe::decode(bytes).map_err(|error| error.to_string())?;
             }
             Message::Tears(row) => self.check_tears(row)?,
+            Message::Forces(row) => self.check_forces(row)?,
             _ => {}
         }
         match &message {
@@ -246,6 +247,24 @@ impl ContentCheck {
             return Err(format!("step {step}: its sequence is that of another step"));
         }
         Ok(())
+    }
+
+    pub(super) fn selection(&self) -> ContentSelection {
+        self.selection
+    }
+
+    /// Compares the impulses with the particles of the scene.
+    fn check_forces(&self, row: &ForcesRow) -> Result<(), String> {
+        let (step, count) = (row.step, self.run.particle_count);
+        if let Some(problem) = row.problem() {
+            return Err(format!("step {step}: {problem}"));
+        }
+        match row.particles.iter().find(|index| **index >= count) {
+            Some(index) => Err(format!(
+                "step {step}: the scene has no particle {index}, but {count} particles"
+            )),
+            None => Ok(()),
+        }
     }
 
     /// Compares the list of torn constraints with the constraints of the scene.

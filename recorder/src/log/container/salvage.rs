@@ -219,7 +219,7 @@ impl<W: Write> Salvage<W> {
         load: Option<LoadRows>,
     ) -> Result<(), WriteError> {
         let mut ids = BTreeMap::new();
-        for topic in Topic::ALL {
+        for topic in content.selection().declared() {
             let TopicFormat { encoding, schema } = TopicFormat::for_topic(topic);
             let mut channel = Channel {
                 id: 0,

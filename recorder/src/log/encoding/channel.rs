@@ -34,7 +34,7 @@ impl TopicChannel {
     /// Returns the first format version with such a channel.
     pub(in crate::log) fn first_version(self) -> u32 {
         match (self.topic, self.keyframe_form) {
-            (Topic::Keyframe, KeyframeForm::Message) => 5,
+            (Topic::Keyframe, KeyframeForm::Message) | (Topic::Forces, _) => 5,
             (Topic::Parameters, _) => 3,
             (Topic::Colliders, _) => 2,
             _ => 1,

@@ -9,6 +9,7 @@ use mcap::records::{AttachmentHeader, Channel, MessageHeader, SchemaHeader};
 
 use super::decode::LoggedMessage;
 use crate::log::encoding::{MessageEncoder, TopicFormat, encode_transform};
+use crate::log::run::selection::ContentSelection;
 use crate::log::run::{
     Closing, FORMAT_VERSION, REPAIR_METADATA, RunDescription, SCENE_ATTACHMENT, SCENE_MEDIA_TYPE,
     header_library,
@@ -35,6 +36,8 @@ pub struct Audit {
     /// Content of other programs, which is not compared.
     foreign: BTreeSet<String>,
     encoder: MessageEncoder,
+    /// The recording has forces.
+    has_forces: bool,
     formats: Formats,
     /// The topic that each schema defines, by id. `None` for a schema of another program.
     schemas: BTreeMap<u16, Option<Topic>>,
@@ -69,6 +72,8 @@ pub(super) struct HeaderText {
     pub(super) profile: String,
     pub(super) library: String,
     pub(super) run: BTreeMap<String, String>,
+    /// `None` if the file does not declare one.
+    pub(super) selection: Option<BTreeMap<String, String>>,
     /// `None` if the file has no scene.
     pub(super) scene: Option<AttachmentHeader>,
 }
@@ -96,7 +101,21 @@ impl Audit {
         }
     }
 
-    pub(super) fn check_header(&mut self, text: &HeaderText, run: &RunDescription) {
+    pub(super) fn check_header(
+        &mut self,
+        text: &HeaderText,
+        run: &RunDescription,
+        selection: ContentSelection,
+    ) {
+        self.has_forces = selection.has_topic(Topic::Forces);
+        let expected = selection.to_map();
+        if let Some(found) = text.selection.as_ref().filter(|found| **found != expected) {
+            let key = first_other_key(found, &expected);
+            self.report(
+                None,
+                format!("the metadata 'selection': its entry '{key}' has another form"),
+            );
+        }
         if text.run != run.to_map() {
             let expected = run.to_map();
             let key = first_other_key(&text.run, &expected);
@@ -148,6 +167,10 @@ impl Audit {
             self.add_foreign(format!("topic '{}'", channel.topic));
             return;
         };
+        if topic == Topic::Forces && !self.has_forces {
+            let what = "the metadata 'selection' does not declare /forces, which the file has";
+            self.report(None, what.to_owned());
+        }
         let encoding = self.formats.0[topic.index()].encoding;
         let has_own_schema = self.schemas.get(&channel.schema_id) == Some(&Some(topic));
         let has_own_encoding = channel.message_encoding == encoding && channel.metadata.is_empty();

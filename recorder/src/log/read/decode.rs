@@ -68,6 +68,7 @@ impl MessageDecoder<'_> {
             Topic::Colliders => Message::Colliders(row(data)?),
             Topic::Tears => Message::Tears(row(data)?),
             Topic::Parameters => Message::Parameters(row(data)?),
+            Topic::Forces => Message::Forces(row(data)?),
             Topic::Outcomes => Message::Outcome(row(data)?),
             Topic::Status => Message::Status(row(data)?),
             Topic::Events => Message::Event(row(data)?),

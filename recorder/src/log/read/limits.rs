@@ -64,6 +64,9 @@ impl SizeLimits {
             Topic::Colliders => 16 * scene_size_bytes,
             // An index and a cause.
             Topic::Tears => 32 * constraint_count,
+            // An index of up to 9 digits and three numbers of up to 25 for each particle. A collider or an anchor
+            // has at least 32 bytes in the scene.
+            Topic::Forces => 96 * particle_count + 16 * scene_size_bytes,
             // The same bounds as `Solver::keyframe_size_bytes_max`.
             Topic::Keyframe => 64 * particle_count + 16 * constraint_count + 2 * scene_size_bytes,
             Topic::Particles => 32 * particle_count,

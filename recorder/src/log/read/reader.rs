@@ -145,6 +145,7 @@ impl<R: Read> LogReader<R> {
                 }
                 Some(HeaderRecord::Selection(map)) => {
                     selection = ContentSelection::read(&map)?;
+                    header.selection = Some(map);
                 }
                 Some(HeaderRecord::Skipped) => {}
                 Some(HeaderRecord::Message) => {
@@ -194,7 +195,7 @@ impl<R: Read> LogReader<R> {
     pub fn with_audit(mut self) -> Self {
         if self.is_current_format() {
             let mut audit = Box::<Audit>::default();
-            audit.check_header(&self.header, &self.run);
+            audit.check_header(&self.header, &self.run, self.selection);
             self.audit = Some(audit);
         }
         self

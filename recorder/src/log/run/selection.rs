@@ -14,9 +14,11 @@ const EVERY: &str = "every";
 const LEFT_OUT: &str = "left_out";
 /// Key of a recording of commands. Only such a recording has it.
 const ONLY_COMMANDS: &str = "only_commands";
+/// Key of a recording of forces. Only such a recording has it.
+const FORCES: &str = "forces";
 
 /// The topics and snapshots of a recording: metadata `selection`, before the metadata `run`. The default
-/// is everything, and a file with everything has no such record.
+/// is everything but the forces, which are recorded only on request, and such a file has no such record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ContentSelection {
     every: NonZeroU32,
@@ -27,11 +29,9 @@ pub struct ContentSelection {
 
 impl Default for ContentSelection {
     fn default() -> Self {
-        Self {
-            every: NonZeroU32::MIN,
-            left_out: [false; Topic::ALL.len()],
-            is_only_commands: false,
-        }
+        let mut left_out = [false; Topic::ALL.len()];
+        left_out[Topic::Forces.index()] = true;
+        Self { every: NonZeroU32::MIN, left_out, is_only_commands: false }
     }
 }
 
@@ -79,6 +79,13 @@ impl ContentSelection {
         Self { is_only_commands: true, ..self }
     }
 
+    /// Adds the forces.
+    #[must_use]
+    pub fn with_forces(mut self) -> Self {
+        self.left_out[Topic::Forces.index()] = false;
+        self
+    }
+
     /// Returns the selection of the same recording with the particles of all its snapshots.
     #[must_use]
     pub fn with_all_particles(self) -> Self {
@@ -90,9 +97,22 @@ impl ContentSelection {
         self.is_only_commands
     }
 
-    /// Returns `true` if nothing is left out.
+    /// Returns `true` if nothing is left out, and nothing is recorded on request.
     pub fn is_everything(&self) -> bool {
         *self == Self::default()
+    }
+
+    /// Returns the topics that the recording leaves out. Forces are not among them: a recording has them on
+    /// request.
+    pub fn left_out(&self) -> impl Iterator<Item = Topic> {
+        Self::OPTIONAL.into_iter().filter(|topic| !self.has_topic(*topic))
+    }
+
+    /// Returns the topics that a recorder declares in a file, those that it leaves out too, but forces only with
+    /// their rows.
+    pub(in crate::log) fn declared(self) -> impl Iterator<Item = Topic> {
+        let is_declared = move |topic: &Topic| *topic != Topic::Forces || self.has_topic(*topic);
+        Topic::ALL.into_iter().filter(is_declared)
     }
 
     /// Returns `true` for a topic of the recording.
@@ -137,14 +157,16 @@ impl ContentSelection {
     }
 
     pub(in crate::log) fn to_map(self) -> BTreeMap<String, String> {
-        let left_out = Topic::ALL.into_iter().filter(|topic| !self.has_topic(*topic));
-        let left_out: Vec<_> = left_out.map(Topic::name).collect();
+        let left_out: Vec<_> = self.left_out().map(Topic::name).collect();
         let mut map = BTreeMap::from([
             (EVERY.to_owned(), self.every.to_string()),
             (LEFT_OUT.to_owned(), left_out.join(" ")),
         ]);
         if self.is_only_commands {
             map.insert(ONLY_COMMANDS.to_owned(), true.to_string());
+        }
+        if self.has_topic(Topic::Forces) {
+            map.insert(FORCES.to_owned(), true.to_string());
         }
         map
     }
@@ -161,12 +183,15 @@ impl ContentSelection {
         let topics = topics
             .map(|name| Topic::from_name(name).filter(|topic| Self::OPTIONAL.contains(topic)));
         let selection = Self::new(every, &topics.collect::<Option<Vec<_>>>()?);
-        match map.get(ONLY_COMMANDS).map(String::as_str) {
-            None => Some(selection),
-            Some("true") => Some(selection.with_only_commands()),
-            Some(_) => None,
-        }
+        let selection =
+            if is_set(map, ONLY_COMMANDS)? { selection.with_only_commands() } else { selection };
+        Some(if is_set(map, FORCES)? { selection.with_forces() } else { selection })
     }
+}
+
+/// Returns `true` for a key with the value "true"; `None` for any other value.
+fn is_set(map: &BTreeMap<String, String>, key: &str) -> Option<bool> {
+    map.get(key).map_or(Some(false), |value| (value == "true").then_some(true))
 }
 
 #[cfg(test)]
@@ -179,7 +204,12 @@ mod tests {
 
     #[test]
     fn a_selection_survives_a_round_trip_and_refuses_what_no_recorder_writes() {
-        for selection in [ContentSelection::default(), every(7), every(1).with_only_commands()] {
+        for selection in [
+            ContentSelection::default(),
+            every(7),
+            every(1).with_only_commands(),
+            every(7).with_forces(),
+        ] {
             assert_eq!(ContentSelection::from_map(&selection.to_map()), Some(selection));
         }
         for (key, value) in [
@@ -188,6 +218,8 @@ mod tests {
             ("left_out", "/steps"),
             ("left_out", "?"),
             ("only_commands", "no"),
+            ("forces", "no"),
+            ("left_out", "/forces"),
         ] {
             let mut map = every(2).to_map();
             map.insert(key.to_owned(), value.to_owned());

@@ -5,8 +5,8 @@ use mcap::records::op;
 use sim_solver::scene::Up;
 
 use super::bytes::{metadata_bytes, metadata_of};
-use super::{Record, file_of, records, topics, verified, written};
-use crate::log::{LogOptions, LogReader, LogWriter, RunDescription, Topic};
+use super::{Record, file_of, records, topics, verified, written_with};
+use crate::log::{ContentSelection, LogOptions, LogReader, LogWriter, RunDescription, Topic};
 use crate::proof_tests::edits::edit::MESSAGE_HEADER_SIZE_BYTES;
 
 /// Changes the metadata of a record, if it has this name.
@@ -49,7 +49,7 @@ fn as_format_4(records: &mut [Record]) {
 
 #[test]
 fn a_recording_of_format_4_is_identical_except_for_the_form_of_its_messages() {
-    let mut records = records(&written());
+    let mut records = records(&written_with(ContentSelection::default()));
     as_format_4(&mut records);
     let (finding, not_covered) = verified(&file_of(&records));
     assert_eq!(finding, None);
@@ -58,7 +58,7 @@ fn a_recording_of_format_4_is_identical_except_for_the_form_of_its_messages() {
 
 #[test]
 fn a_recording_with_another_axis_up_than_its_scene_is_found() {
-    let file = written();
+    let file = written_with(ContentSelection::default());
     let mut log = LogReader::new(file.as_slice()).unwrap();
     let run = RunDescription { up: Up::Z, ..log.run().clone() };
     let options = LogOptions::default();
@@ -73,7 +73,7 @@ fn a_recording_with_another_axis_up_than_its_scene_is_found() {
 
 #[test]
 fn a_recording_of_today_that_claims_an_older_format_is_found() {
-    let mut records = records(&written());
+    let mut records = records(&written_with(ContentSelection::default()));
     for record in &mut records {
         change_entry(record, "run", "format_version", Some("4"));
     }

@@ -6,6 +6,7 @@ use sim_types::ParameterValues;
 
 use crate::client::views::Parameters;
 use crate::messages::collider::{ColliderState, CollidersHeader};
+use crate::messages::forces::{ForceRow, ForcesHeader};
 use crate::messages::outcome::Outcome;
 use crate::messages::parameters::ParametersHeader;
 use crate::messages::snapshot::SnapshotHeader;
@@ -24,6 +25,8 @@ pub enum Change {
     Tears(TearsHeader, Vec<TornConstraint>),
     /// The parameters from a step on.
     Parameters(ParametersHeader, ParameterValues),
+    /// The impulses of a step. Only for a tap that reads them.
+    Forces(ForcesHeader, Vec<ForceRow>),
     /// The keyframe of a step.
     Keyframe(KeyframeHeader, Vec<u8>),
     /// The outcome of a command. Commands that control a replay are left out.
@@ -38,8 +41,9 @@ impl Change {
             Self::Colliders(..) => 1,
             Self::Tears(..) => 2,
             Self::Parameters(..) => 3,
-            Self::Keyframe(..) => 4,
-            Self::Outcome(_) => 5,
+            Self::Forces(..) => 4,
+            Self::Keyframe(..) => 5,
+            Self::Outcome(_) => 6,
         }
     }
 }
@@ -53,6 +57,8 @@ pub struct LostChanges {
     pub tears: u64,
     /// Values of the parameters.
     pub parameters: u64,
+    /// Impulses of steps.
+    pub forces: u64,
     /// Keyframes.
     pub keyframes: u64,
     /// Outcomes.
@@ -66,6 +72,7 @@ impl LostChanges {
             Change::Colliders(..) => self.colliders += 1,
             Change::Tears(..) => self.tears += 1,
             Change::Parameters(..) => self.parameters += 1,
+            Change::Forces(..) => self.forces += 1,
             Change::Keyframe(..) => self.keyframes += 1,
             Change::Outcome(_) => self.outcomes += 1,
         }

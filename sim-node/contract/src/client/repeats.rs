@@ -3,6 +3,7 @@
 use sim_types::ParameterValues;
 
 use crate::messages::collider::CollidersHeader;
+use crate::messages::forces::ForcesHeader;
 use crate::messages::parameters::ParametersHeader;
 use crate::messages::snapshot::SnapshotHeader;
 use crate::messages::tears::TearsHeader;
@@ -18,6 +19,7 @@ pub(crate) struct Repeats {
     colliders: Option<CollidersHeader>,
     tears: Option<TearsHeader>,
     parameters: Option<(ParametersHeader, ParameterValues)>,
+    forces: Option<ForcesHeader>,
     keyframe: Option<KeyframeHeader>,
     snapshot: Option<SnapshotHeader>,
 }
@@ -33,6 +35,7 @@ impl Repeats {
             Update::Tears(header, _) => is_same(&mut self.tears, *header),
             // Several messages of one step have the same header.
             Update::Parameters(header, values) => is_same(&mut self.parameters, (*header, *values)),
+            Update::Forces(header, _) => is_same(&mut self.forces, *header),
             Update::Keyframe(header, _) => is_same(&mut self.keyframe, *header),
             Update::Outcome(_) | Update::Status(_) => false,
         }

@@ -67,6 +67,9 @@ impl StateAssembler {
             Update::Parameters(header, values) => {
                 changes.push(header.run_id, header.step, Change::Parameters(*header, *values));
             }
+            Update::Forces(header, rows) => {
+                changes.push(header.run_id, header.step, Change::Forces(*header, rows.to_vec()));
+            }
             Update::Keyframe(header, bytes) => {
                 changes.push(header.run_id, header.step, Change::Keyframe(*header, bytes.to_vec()));
             }
@@ -151,7 +154,7 @@ impl StateAssembler {
                 self.changes.push(Change::Tears(*header, new));
                 return;
             }
-            Change::Load | Change::Keyframe(..) | Change::Outcome(_) => {}
+            Change::Load | Change::Forces(..) | Change::Keyframe(..) | Change::Outcome(_) => {}
         }
         self.changes.push(change);
     }

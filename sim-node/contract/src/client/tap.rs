@@ -15,6 +15,7 @@ use crate::clock::monotonic_ns;
 use crate::endpoint::Endpoint;
 use crate::limits::{COMMANDS_PER_STEP_MAX, OUTCOMES_BUFFERED, UPDATES_BUFFERED};
 use crate::messages::collider::{ColliderState, CollidersHeader};
+use crate::messages::forces::{ForceRow, ForcesHeader};
 use crate::messages::outcome::Outcome;
 use crate::messages::parameters::to_values;
 use crate::messages::parameters::{ParameterState, ParametersHeader};
@@ -25,8 +26,8 @@ use crate::messages::topology::{ConstraintState, KeyframeHeader, LoadHeader, Tri
 use crate::messages::update::Update;
 use crate::ports::reader::{Drained, ReadError, SliceReader, SliceSample, ValueReader};
 use crate::ports::service::{
-    COLLIDERS, KEYFRAME, OUTCOMES, PARAMETERS, PARTICLES, SCENE, STATUS, SURFACE, ServiceError,
-    TEARS, TOPOLOGY,
+    COLLIDERS, FORCES, KEYFRAME, OUTCOMES, PARAMETERS, PARTICLES, SCENE, STATUS, SURFACE,
+    ServiceError, TEARS, TOPOLOGY,
 };
 use crate::ports::services::{AttachError, Attachment};
 use crate::ports::source::Source;
@@ -84,6 +85,8 @@ pub struct Tap {
     scene: SliceReader<u8, LoadHeader>,
     topology: SliceReader<ConstraintState, LoadHeader>,
     surface: SliceReader<Triangle, LoadHeader>,
+    /// Only of a tap that reads them.
+    forces: Option<SliceReader<ForceRow, ForcesHeader>>,
     keyframe: SliceReader<u8, KeyframeHeader>,
     particles: SliceReader<ParticleState, SnapshotHeader>,
     assembler: StateAssembler,
@@ -151,6 +154,7 @@ impl Tap {
             scene: SliceReader::create(&services.scene, &SCENE)?.restricted_to(source),
             topology: SliceReader::create(&services.topology, &TOPOLOGY)?.restricted_to(source),
             surface: SliceReader::create(&services.surface, &SURFACE)?.restricted_to(source),
+            forces: None,
             keyframe: SliceReader::create(&services.keyframe, &KEYFRAME)?.restricted_to(source),
             particles: SliceReader::create(&services.particles, &PARTICLES)?.restricted_to(source),
             assembler: StateAssembler::default(),
@@ -165,6 +169,20 @@ impl Tap {
         };
         attachment.request_latched();
         Ok(tap)
+    }
+
+    /// Reads the forces, too, from a step on that follows soon: [`Update::Forces`], and [`Change::Forces`] in the
+    /// states. They cost the node a little time in each step, so no tap reads them unasked.
+    ///
+    /// # Errors
+    /// The service has no place for another reader, or `/dev/shm` is full.
+    ///
+    /// [`Change::Forces`]: crate::Change::Forces
+    pub fn read_forces(&mut self) -> Result<(), ServiceError> {
+        let source = Arc::new(Source::new(&self.attachment.status));
+        let reader = SliceReader::create(&self.attachment.services.forces, &FORCES)?;
+        self.forces = Some(reader.restricted_to(&source));
+        Ok(())
     }
 
     /// Returns the oldest unread state with everything that belongs to it; `None` if all were read. A
@@ -323,6 +341,9 @@ impl Tap {
         self.parameters.drain(result, |header, states| {
             sink(Update::Parameters(header, &to_values(states)));
         });
+        if let Some(forces) = &self.forces {
+            forces.drain(result, |header, rows| sink(Update::Forces(header, rows)));
+        }
         self.keyframe.drain(result, |header, bytes| sink(Update::Keyframe(header, bytes)));
         self.outcomes.drain(result, |outcome| sink(Update::Outcome(outcome)));
         self.status.drain(result, |status| sink(Update::Status(status)));

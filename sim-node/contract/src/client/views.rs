@@ -1,6 +1,7 @@
 //! The data that a client reads.
 
 use crate::messages::collider::{ColliderState, CollidersHeader};
+use crate::messages::forces::{ForceKind, ForceRow, ForcesHeader};
 use crate::messages::parameters::ParametersHeader;
 use crate::messages::snapshot::{ParticleState, SnapshotHeader};
 use crate::messages::topology::{ConstraintState, LoadHeader, Triangle};
@@ -58,4 +59,36 @@ pub struct Colliders {
     pub header: CollidersHeader,
     /// The `header.count` colliders, by index.
     pub colliders: Vec<ColliderState>,
+}
+
+/// The impulses of a step on colliders, anchors and fixed particles.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Forces {
+    /// Header of the rows: the step, and its rate.
+    pub header: ForcesHeader,
+    /// The `header.count` rows: of each collider, then of each anchor, then of each pinned, grabbed or
+    /// anchored particle.
+    pub rows: Vec<ForceRow>,
+}
+
+impl Forces {
+    /// Returns the rows of a kind, by index.
+    pub fn of_kind(&self, kind: ForceKind) -> impl Iterator<Item = &ForceRow> {
+        self.rows.iter().filter(move |row| row.kind() == Some(kind))
+    }
+
+    /// Returns the row of a collider, anchor or particle; `None` for a particle that is free.
+    pub fn row(&self, kind: ForceKind, index: u32) -> Option<&ForceRow> {
+        self.of_kind(kind).find(|row| row.index == index)
+    }
+
+    /// Returns the force of a row in N: its impulse over the time of the step.
+    pub fn force(&self, row: &ForceRow) -> [f64; 3] {
+        row.impulse.map(|axis| f64::from(axis) * f64::from(self.header.rate_hz))
+    }
+
+    /// Returns the torque of a row in N m, about the center of the collider or anchor.
+    pub fn torque(&self, row: &ForceRow) -> [f64; 3] {
+        row.angular_impulse.map(|axis| f64::from(axis) * f64::from(self.header.rate_hz))
+    }
 }

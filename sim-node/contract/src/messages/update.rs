@@ -3,6 +3,7 @@
 use sim_types::ParameterValues;
 
 use crate::messages::collider::{ColliderState, CollidersHeader};
+use crate::messages::forces::{ForceRow, ForcesHeader};
 use crate::messages::outcome::Outcome;
 use crate::messages::parameters::ParametersHeader;
 use crate::messages::status::NodeStatus;
@@ -24,6 +25,8 @@ pub enum Update<'a> {
     Tears(&'a TearsHeader, &'a [TornConstraint]),
     /// The values of all parameters.
     Parameters(&'a ParametersHeader, &'a ParameterValues),
+    /// The impulses of a step. Only for a tap that reads them.
+    Forces(&'a ForcesHeader, &'a [ForceRow]),
     /// The keyframe that completes a snapshot.
     Keyframe(&'a KeyframeHeader, &'a [u8]),
     /// The outcome of a command.

@@ -4,6 +4,7 @@ use std::cell::RefCell;
 use std::fs::File;
 
 use crate::messages::collider::{ColliderState, CollidersHeader};
+use crate::messages::forces::{ForceRow, ForcesHeader};
 use crate::messages::parameters::{ParameterState, ParametersHeader};
 use crate::messages::restore::scene_hash;
 use crate::messages::snapshot::{ParticleState, SnapshotHeader};
@@ -60,6 +61,8 @@ pub(crate) struct LoadWriters {
     pub(super) tears: SliceWriter<TornConstraint, TearsHeader>,
     pub(super) parameters: SliceWriter<ParameterState, ParametersHeader>,
     pub(super) colliders: SliceWriter<ColliderState, CollidersHeader>,
+    /// Only while a client reads the forces.
+    pub(super) forces: RefCell<Option<SliceWriter<ForceRow, ForcesHeader>>>,
 }
 
 /// Memory of the writers of a load.
@@ -125,12 +128,13 @@ impl LoadWriters {
             tears: SliceWriter::create(config, &services.tears, capacities.tears)?,
             parameters: SliceWriter::create(config, &services.parameters, capacities.parameters)?,
             colliders: SliceWriter::create(config, &services.colliders, capacities.colliders)?,
+            forces: RefCell::new(None),
         })
     }
 
     /// Removes the writers, and returns their segments, which keep their memory until they are closed.
     pub(super) fn close(self) -> Vec<File> {
-        vec![
+        let always = [
             self.particles.close(),
             self.keyframe.close(),
             self.scene.into_inner().close(),
@@ -139,7 +143,8 @@ impl LoadWriters {
             self.tears.close(),
             self.parameters.close(),
             self.colliders.close(),
-        ]
+        ];
+        always.into_iter().chain(self.forces.into_inner().map(SliceWriter::close)).collect()
     }
 
     /// Returns the size of the longest state of the load: its particles and a keyframe.
@@ -206,6 +211,7 @@ impl LoadWriters {
         self.colliders.refresh();
         self.tears.refresh();
         self.parameters.refresh();
+        self.forces.borrow().iter().for_each(SliceWriter::refresh);
         self.keyframe.refresh();
         self.particles.refresh();
     }

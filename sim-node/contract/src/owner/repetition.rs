@@ -13,7 +13,8 @@ use crate::owner::load::LoadWriters;
 use crate::ports::port::SliceHeader;
 use crate::ports::reader::{ReadError, SliceReader, SliceSample};
 use crate::ports::service::{
-    COLLIDERS, KEYFRAME, PARAMETERS, PARTICLES, SCENE, SURFACE, ServiceSpec, TEARS, TOPOLOGY,
+    COLLIDERS, FORCES, KEYFRAME, PARAMETERS, PARTICLES, SCENE, SURFACE, ServiceSpec, TEARS,
+    TOPOLOGY,
 };
 use crate::ports::services::Services;
 use crate::ports::session::Slices;
@@ -21,7 +22,7 @@ use crate::ports::writer::SliceWriter;
 
 /// Messages of a repetition, in the order of publication: one at a time, because each costs the loop a part
 /// of a millisecond, and longer if it is large.
-const MESSAGE_COUNT: usize = 8;
+const MESSAGE_COUNT: usize = 9;
 
 /// Progress of the repetition.
 #[derive(Debug, Default)]
@@ -69,7 +70,12 @@ impl Repetition {
             5 => repeat(&writers.parameters, &services.parameters, &PARAMETERS),
             _ if self.has_new_snapshot.get() => Ok(()),
             // The owner is paused.
-            6 => repeat(&writers.keyframe, &services.keyframe, &KEYFRAME),
+            6 => writers
+                .forces
+                .borrow()
+                .iter()
+                .try_for_each(|writer| repeat(writer, &services.forces, &FORCES)),
+            7 => repeat(&writers.keyframe, &services.keyframe, &KEYFRAME),
             _ => repeat(&writers.particles, &services.particles, &PARTICLES),
         };
         let is_last = index + 1 == MESSAGE_COUNT;

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Debug;
 
+use iceoryx2::identifiers::UniqueNodeId;
 use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::prelude::{
     CallbackProgression, NodeState, PortFactory, ZeroCopySend, ipc_threadsafe,
@@ -10,7 +11,8 @@ use iceoryx2::prelude::{
 
 use crate::limits::BORROWED_UPDATES_MAX;
 use crate::messages::command::Command;
-use crate::ports::session::Values;
+use crate::ports::port::SliceHeader;
+use crate::ports::session::{Slices, Values};
 
 /// A connection of a client: its publisher of commands or of a member's messages. A client that
 /// connects again has another one, even under the same client id.
@@ -89,14 +91,34 @@ pub(crate) fn living<T: Debug + ZeroCopySend>(service: &Values<T>) -> Vec<Connec
         publishers.push((publisher.node_id, ConnectionId(publisher.publisher_id.value())));
         CallbackProgression::Continue
     });
+    let dead = dead_nodes(service);
+    publishers.retain(|(node, _)| !dead.contains(node));
+    publishers.into_iter().map(|(_, connection)| connection).collect()
+}
+
+/// Returns `true` if a reader of a service is alive, in the same sense.
+pub(crate) fn has_living_reader<T, H>(service: &Slices<T, H>) -> bool
+where
+    T: Debug + ZeroCopySend + 'static,
+    H: SliceHeader,
+{
+    let mut readers = Vec::new();
+    service.dynamic_config().list_subscribers(|subscriber| {
+        readers.push(subscriber.node_id);
+        CallbackProgression::Continue
+    });
+    let dead = dead_nodes(service);
+    readers.iter().any(|node| !dead.contains(node))
+}
+
+/// After an error, the nodes that were not listed count as alive.
+fn dead_nodes(service: &impl PortFactory<Service = ipc_threadsafe::Service>) -> Vec<UniqueNodeId> {
     let mut dead = Vec::new();
-    // After an error, the nodes that were not listed count as alive.
     let _ = service.nodes(|node| {
         if let NodeState::Dead(_) = node {
             dead.push(*node.node_id());
         }
         CallbackProgression::Continue
     });
-    publishers.retain(|(node, _)| !dead.contains(node));
-    publishers.into_iter().map(|(_, connection)| connection).collect()
+    dead
 }

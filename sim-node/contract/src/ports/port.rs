@@ -6,6 +6,7 @@ use iceoryx2::prelude::{IceoryxSend, PortFactory, ZeroCopySend, ipc_threadsafe};
 use iceoryx2::service::port_factory::publish_subscribe;
 
 use crate::messages::collider::CollidersHeader;
+use crate::messages::forces::ForcesHeader;
 use crate::messages::parameters::ParametersHeader;
 use crate::messages::restore::RestoreHeader;
 use crate::messages::snapshot::SnapshotHeader;
@@ -39,6 +40,12 @@ impl SliceHeader for TearsHeader {
 }
 
 impl SliceHeader for CollidersHeader {
+    fn element_count(&self) -> u64 {
+        self.count.into()
+    }
+}
+
+impl SliceHeader for ForcesHeader {
     fn element_count(&self) -> u64 {
         self.count.into()
     }

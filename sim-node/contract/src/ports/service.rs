@@ -79,6 +79,9 @@ pub(crate) const PARAMETERS: ServiceSpec =
 /// Buffers as many messages as snapshots, because a moving collider has a message in each step.
 pub(crate) const COLLIDERS: ServiceSpec =
     ServiceSpec { suffix: "colliders", buffered: SNAPSHOTS_BUFFERED, ..LATCHED };
+/// Buffers as many messages as snapshots, because each step has one.
+pub(crate) const FORCES: ServiceSpec =
+    ServiceSpec { suffix: "forces", buffered: SNAPSHOTS_BUFFERED, ..LATCHED };
 pub(crate) const STATUS: ServiceSpec =
     ServiceSpec { suffix: "status", publishers_max: STATUS_PUBLISHERS_MAX, ..LATCHED };
 pub(crate) const OUTCOMES: ServiceSpec = ServiceSpec {
@@ -126,7 +129,7 @@ pub(crate) const WAKE: ServiceSpec = ServiceSpec {
 };
 
 /// All services of a name.
-pub(crate) const SERVICES: [&ServiceSpec; 14] = [
+pub(crate) const SERVICES: [&ServiceSpec; 15] = [
     &PARTICLES,
     &KEYFRAME,
     &TOPOLOGY,
@@ -135,6 +138,7 @@ pub(crate) const SERVICES: [&ServiceSpec; 14] = [
     &TEARS,
     &PARAMETERS,
     &COLLIDERS,
+    &FORCES,
     &COMMANDS,
     &OUTCOMES,
     &READY,

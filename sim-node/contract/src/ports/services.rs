@@ -10,6 +10,7 @@ use thiserror::Error;
 use crate::endpoint::Endpoint;
 use crate::messages::collider::{ColliderState, CollidersHeader};
 use crate::messages::command::Command;
+use crate::messages::forces::{ForceRow, ForcesHeader};
 use crate::messages::outcome::Outcome;
 use crate::messages::parameters::{ParameterState, ParametersHeader};
 use crate::messages::ready::Ready;
@@ -21,9 +22,10 @@ use crate::messages::topology::{ConstraintState, KeyframeHeader, LoadHeader, Tri
 use crate::ports::domain::orphans::{self, Port};
 use crate::ports::domain::owner_lock::OwnerLock;
 use crate::ports::mirror::Mirror;
+use crate::ports::port::reader_count;
 use crate::ports::service::{
-    COLLIDERS, COMMANDS, KEYFRAME, OUTCOMES, PARAMETERS, PARTICLES, READY, RESTORE, SCENE, STATUS,
-    SURFACE, ServiceError, TEARS, TOPOLOGY,
+    COLLIDERS, COMMANDS, FORCES, KEYFRAME, OUTCOMES, PARAMETERS, PARTICLES, READY, RESTORE, SCENE,
+    STATUS, SURFACE, ServiceError, TEARS, TOPOLOGY,
 };
 use crate::ports::session::{Access, Events, Session, Slices, Values};
 use crate::ports::source::{is_mirror, owner_nodes};
@@ -41,6 +43,7 @@ pub(crate) struct Services {
     pub(crate) tears: Slices<TornConstraint, TearsHeader>,
     pub(crate) parameters: Slices<ParameterState, ParametersHeader>,
     pub(crate) colliders: Slices<ColliderState, CollidersHeader>,
+    pub(crate) forces: Slices<ForceRow, ForcesHeader>,
     pub(crate) commands: Values<Command>,
     pub(crate) outcomes: Values<Outcome>,
     pub(crate) ready: Values<Ready>,
@@ -62,6 +65,7 @@ impl Services {
             tears: session.slices(&TEARS, access)?,
             parameters: session.slices(&PARAMETERS, access)?,
             colliders: session.slices(&COLLIDERS, access)?,
+            forces: session.slices(&FORCES, access)?,
             commands: session.values(&COMMANDS, access)?,
             outcomes: session.values(&OUTCOMES, access)?,
             ready: session.values(&READY, access)?,
@@ -83,6 +87,7 @@ impl Services {
             orphans::ports(&self.tears),
             orphans::ports(&self.parameters),
             orphans::ports(&self.colliders),
+            orphans::ports(&self.forces),
             orphans::ports(&self.commands),
             orphans::ports(&self.outcomes),
             orphans::ports(&self.ready),
@@ -90,6 +95,20 @@ impl Services {
             orphans::event_ports(&self.wake),
         ]
         .concat()
+    }
+
+    /// Returns the number of readers of everything that the owner publishes, except the status.
+    pub(crate) fn reader_count(&self) -> usize {
+        reader_count(&self.particles)
+            + reader_count(&self.keyframe)
+            + reader_count(&self.topology)
+            + reader_count(&self.surface)
+            + reader_count(&self.scene)
+            + reader_count(&self.tears)
+            + reader_count(&self.parameters)
+            + reader_count(&self.colliders)
+            + reader_count(&self.forces)
+            + reader_count(&self.outcomes)
     }
 }
 

@@ -7,10 +7,10 @@ use std::mem::offset_of;
 
 use iceoryx2::service::static_config::message_type_details::{TypeDetail, TypeVariant};
 use sim_contract::{
-    ColliderState, CollidersHeader, Command, ConstraintState, KeyframeHeader, LoadHeader,
-    MemberChange, MemberChanges, MemberStatus, NodeStatus, Outcome, ParameterState,
-    ParametersHeader, ParticleState, Ready, RestoreHeader, SnapshotHeader, TearsHeader,
-    TornConstraint, Triangle, Wake,
+    ColliderState, CollidersHeader, Command, ConstraintState, ForceRow, ForcesHeader,
+    KeyframeHeader, LoadHeader, MemberChange, MemberChanges, MemberStatus, NodeStatus, Outcome,
+    ParameterState, ParametersHeader, ParticleState, Ready, RestoreHeader, SnapshotHeader,
+    TearsHeader, TornConstraint, Triangle, Wake,
 };
 
 macro_rules! layout {
@@ -113,6 +113,8 @@ fn write_state_layouts(text: &mut String) {
         }
     );
     layout!(text, CollidersHeader { run_id, step, count, list_index });
+    layout!(text, ForcesHeader { run_id, step, count, rate_hz });
+    layout!(text, ForceRow { kind, index, impulse, angular_impulse, contacts, spare });
     layout!(text, KeyframeHeader { run_id, step, size_bytes });
 }
 

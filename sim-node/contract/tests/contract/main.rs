@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "an error fails the test, also in helpers")]
 
 mod commands;
+mod forces;
 mod late_joiner;
 mod layout;
 mod load;

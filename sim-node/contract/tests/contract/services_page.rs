@@ -13,8 +13,8 @@ use iceoryx2::service::static_config::StaticConfig;
 use iceoryx2::service::static_config::messaging_pattern::MessagingPattern;
 use sim_contract::testing::TestDomain;
 use sim_contract::{
-    ActionFields, ColliderShape, CommandOptions, ConstraintKind, MEMBER_CHANGES_KEPT, MEMBERS_MAX,
-    MemberChangeKind, Method, OUTCOME_FLAG_CONTROL, OUTCOME_FLAG_DISCONNECTED,
+    ActionFields, ColliderShape, CommandOptions, ConstraintKind, ForceKind, MEMBER_CHANGES_KEPT,
+    MEMBERS_MAX, MemberChangeKind, Method, OUTCOME_FLAG_CONTROL, OUTCOME_FLAG_DISCONNECTED,
     OUTCOME_FLAG_NEW_RUN, OutcomeStatus, PARAMETERS, ParticleFlags, Ready, Reason, RestoreContents,
     SnapshotFlags, StatusFlags, TearCause, Text, Wake,
 };
@@ -23,12 +23,13 @@ use crate::layout::layouts;
 use crate::support::create_owner;
 
 /// The sources of the messages, for the types and the meanings of the fields.
-const SOURCES: [&str; 10] = [
+const SOURCES: [&str; 11] = [
     include_str!("../../src/messages/snapshot.rs"),
     include_str!("../../src/messages/topology.rs"),
     include_str!("../../src/messages/tears.rs"),
     include_str!("../../src/messages/parameters.rs"),
     include_str!("../../src/messages/collider.rs"),
+    include_str!("../../src/messages/forces.rs"),
     include_str!("../../src/messages/command.rs"),
     include_str!("../../src/messages/outcome.rs"),
     include_str!("../../src/messages/status.rs"),
@@ -243,7 +244,7 @@ fn command_numbers() -> [Numbers; 8] {
     ]
 }
 
-fn state_numbers() -> [Numbers; 9] {
+fn state_numbers() -> [Numbers; 10] {
     let snapshot = [(SnapshotFlags::PAUSED, "paused"), (SnapshotFlags::REPLAY, "replay")];
     let status = [
         (StatusFlags::PAUSED, "paused"),
@@ -269,6 +270,7 @@ fn state_numbers() -> [Numbers; 9] {
         ),
         ("`cause` of a tear", causes.into_iter().chain([(u32::MAX, "unknown")]).collect()),
         ("`shape` of a collider", ColliderShape::ALL.map(|one| (one as u32, one.name())).to_vec()),
+        ("`kind` of a row of forces", ForceKind::ALL.map(|one| (one as u32, one.name())).to_vec()),
         ("`method` of a load", Method::ALL.map(|one| (one as u32, one.name())).to_vec()),
         (
             "`kind` of a member's change",

@@ -21,6 +21,9 @@ from os import PathLike, fspath
 
 from catenary._catenary import (
     Action,
+    AnchorForces,
+    ColliderForces,
+    Forces,
     Outcome,
     Snapshot,
     State,
@@ -50,9 +53,12 @@ __all__ = [
     "GRABBED",
     "PINNED",
     "Action",
+    "AnchorForces",
     "Arrays",
     "Batch",
+    "ColliderForces",
     "Error",
+    "Forces",
     "Lockstep",
     "Node",
     "NotRunning",

@@ -10,6 +10,9 @@ from catenary._types import Floats, Vector, Wholes
 
 __all__ = [
     "Action",
+    "AnchorForces",
+    "ColliderForces",
+    "Forces",
     "Lockstep",
     "Node",
     "Outcome",
@@ -137,6 +140,62 @@ class Topology:
     @property
     def scene_hash(self) -> int:
         """Hash of the scene: a state belongs to the scene with the same one."""
+    def __len__(self) -> int: ...
+
+@final
+class Forces:
+    """The impulses of a step on colliders, anchors and fixed particles.
+
+    The arrays are copies. An impulse in N s is the mean force over the step times its duration: `newtons` returns
+    the force.
+    """
+
+    @property
+    def step(self) -> int:
+        """Number of the step in which the impulses acted."""
+    @property
+    def rate(self) -> int:
+        """Steps per second."""
+    @property
+    def colliders(self) -> ColliderForces:
+        """Impulses of the particles in contact on each collider."""
+    @property
+    def anchors(self) -> AnchorForces:
+        """Impulses on each anchor: the sums of those on its particles."""
+    @property
+    def particles(self) -> Wholes:
+        """Indices of the pinned, grabbed and anchored particles, ascending. Shape: (P,)."""
+    @property
+    def impulses(self) -> Floats:
+        """Impulses of constraints, bends and tethers on each of `particles`, in N s. Shape: (P, 3)."""
+    def newtons(self, impulses: npt.ArrayLike) -> Floats:
+        """Returns impulses in N s as forces in N, or angular impulses in N m s as torques in N m."""
+
+@final
+class ColliderForces:
+    """The impulses on colliders, by index."""
+
+    @property
+    def impulse(self) -> Floats:
+        """Impulses in N s. Shape: (colliders, 3)."""
+    @property
+    def angular_impulse(self) -> Floats:
+        """Angular impulses about the center of the collider, in N m s. Shape: (colliders, 3)."""
+    @property
+    def contacts(self) -> Wholes:
+        """Largest number of particles in contact in one substep. Shape: (colliders,)."""
+    def __len__(self) -> int: ...
+
+@final
+class AnchorForces:
+    """The impulses on anchors, by index."""
+
+    @property
+    def impulse(self) -> Floats:
+        """Impulses in N s. Shape: (anchors, 3)."""
+    @property
+    def angular_impulse(self) -> Floats:
+        """Angular impulses about the center of the anchor, in N m s. Shape: (anchors, 3)."""
     def __len__(self) -> int: ...
 
 @final
@@ -295,6 +354,21 @@ class Node:
         """Returns the indices of the torn constraints, in the order of tearing."""
     def colliders(self) -> list[dict[str, Any]]:
         """Returns the colliders in their newest poses."""
+    def forces(self, timeout: float | None = 5.0) -> Forces:
+        """Returns the newest forces on colliders, anchors and fixed particles. Waits only if none have arrived.
+
+        The node computes them only while a client reads them: the first call waits for the next step, and from then
+        on each step costs the node a little more time, until `close`. A paused node has none until its next step, and
+        a replay only those of a recording that was made with `--forces`.
+
+        Raises `Timeout` if there are none in time.
+        """
+    def forces_of(self, snapshot: Snapshot) -> Forces | None:
+        """Returns the forces of the step of a snapshot, without waiting, or None if this connection has none.
+
+        It has those since the first call of `forces` or `forces_of`, up to 64 steps back. Call it for snapshots in
+        their order: forces before the last read ones are gone.
+        """
     def send(self, action: Action) -> int:
         """Sends an action without waiting. Returns its sequence number, for `outcome`."""
     def outcome(self, sequence: int, timeout: float | None = 5.0) -> Outcome:
@@ -331,7 +405,12 @@ class Lockstep:
 
 class Simulation:
     def __new__(
-        cls, scene: str | PathLike[str] | None = None, threads: int = 1, *, toml: str | None = None
+        cls,
+        scene: str | PathLike[str] | None = None,
+        threads: int = 1,
+        *,
+        toml: str | None = None,
+        forces: bool = False,
     ) -> Self: ...
     def step(self, count: int = 1) -> None:
         """Makes `count` steps. Other threads of the interpreter run meanwhile; Ctrl-C ends it between steps."""
@@ -373,6 +452,12 @@ class Simulation:
         """Returns the indices of the torn constraints, in the order of tearing."""
     def colliders(self) -> list[dict[str, Any]]:
         """Returns the colliders in their current poses."""
+    def forces(self) -> Forces:
+        """Returns the forces of the last step on colliders, anchors and fixed particles: all 0 before the first step, and
+        in a step that put a state in place.
+
+        Raises `Error` for a simulation that was made without `forces=True`.
+        """
     def state(self) -> State:
         """Returns the complete state, which `restore` puts in place again.
 
@@ -430,6 +515,12 @@ class Recording:
         """Returns the first recorded step after `step`."""
     def torn(self, step: int) -> Wholes:
         """Returns the indices of the constraints that are torn at a step, in the order of tearing."""
+    def forces(self, step: int) -> Forces:
+        """Returns the forces of a step on colliders, anchors and fixed particles.
+
+        Raises `KeyError` for a step before the first or after the last one, and `RecordingError` if the file has no
+        forces of the step: it was made without `--forces`, or no step has led to its first state.
+        """
     def steps(self) -> dict[str, npt.NDArray[Any]]:
         """Returns a table of all recorded steps, by column: `pandas.DataFrame(recording.steps())`."""
     def outcomes(self) -> list[dict[str, Any]]:

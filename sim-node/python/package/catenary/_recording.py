@@ -52,18 +52,25 @@ class Recording(_catenary.Recording):
         return True
 
     def at(self, time: float) -> Snapshot:
-        """Returns the last snapshot up to a simulated time in seconds since step 0."""
-        if not 0 <= time < float("inf"):
-            raise ValueError(f"the time is {time} (allowed: 0 or more seconds)")
+        """Returns the last snapshot up to a simulated time in seconds since step 0.
+
+        Raises `ValueError` for a time before the first or after the last recorded step.
+        """
+        first, last = self.first_step / self.rate, self.last_step / self.rate
         # Times of steps are rounded down to nanoseconds.
-        step = int(min(time * self.rate + self.rate * 1e-9 + 1e-6, self.last_step))
-        return self.at_or_before(step)
+        rounding = 1e-9 + 1e-6 / self.rate
+        if not first - rounding <= time <= last + rounding:
+            raise ValueError(f"the time is {time} (allowed: {first:.6g} to {last:.6g} seconds)")
+        return self.at_or_before(int((time + rounding) * self.rate))
 
     def __iter__(self) -> Iterator[Snapshot]:
         return iter(self[:])
 
     def to_numpy(self, start: int | None = None, stop: int | None = None, every: int = 1) -> Arrays:
-        """Reads the snapshots of a range of steps into arrays. `stop` itself is not included."""
+        """Reads the snapshots of a range of steps into arrays. `stop` itself is not included.
+
+        Raises `ValueError` for a range without a snapshot.
+        """
         return self[start:stop:every].to_numpy()
 
     def __enter__(self) -> Recording:
@@ -127,8 +134,14 @@ class Steps:
         return found if found >= start else self._recording.step_after(found)
 
     def to_numpy(self) -> Arrays:
-        """Reads all of the snapshots into arrays."""
+        """Reads all of the snapshots into arrays. Raises `ValueError` if there are none."""
         steps = np.array(list(self._steps()), np.uint64)
+        if not steps.size:
+            recording, wanted = self._recording, self._range
+            raise ValueError(
+                f"{recording.path} has no snapshot in the steps from {wanted.start} up to {wanted.stop} (it has "
+                f"{recording.first_step} to {recording.last_step})"
+            )
         shape = (len(steps), self._recording.particle_count, 3)
         arrays = Arrays(
             steps=steps,

@@ -1,13 +1,13 @@
 //! NumPy arrays that view particles without a copy.
 
 use bytemuck::cast_slice;
-use numpy::ndarray::{ArrayView1, ArrayView2, s};
-use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use numpy::ndarray::{ArrayView1, ArrayView2, Dimension, s};
+use numpy::npyffi::NPY_ARRAY_WRITEABLE;
+use numpy::{PyArray, PyArray1, PyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use sim_contract::ParticleState;
 
 use crate::data::snapshot::Snapshot;
-use crate::error::Error;
 
 /// Number of 4-byte fields of a particle.
 const FIELDS: usize = size_of::<ParticleState>() / 4;
@@ -31,7 +31,7 @@ pub(crate) fn vectors<'py>(
     let vectors = fields.slice(s![.., field..field + 3]);
     // SAFETY: the array holds the owner, which holds the particles.
     let array = unsafe { PyArray2::borrow_from_array(&vectors, owner.clone().into_any()) };
-    read_only(array)
+    Ok(read_only(array))
 }
 
 /// Returns a field of each particle as a read-only array of the shape (particles,).
@@ -45,15 +45,16 @@ pub(crate) fn numbers<'py, T: numpy::Element + bytemuck::AnyBitPattern>(
     let numbers = fields.slice(s![field..;FIELDS]);
     // SAFETY: the array holds the owner, which holds the particles.
     let array = unsafe { PyArray1::borrow_from_array(&numbers, owner.clone().into_any()) };
-    read_only(array)
+    Ok(read_only(array))
 }
 
 /// Forbids writing. NumPy does not let a program undo this, because the array does not own its memory. A write
 /// would end the process: the memory is mapped for reading only.
-fn read_only<T: numpy::Element, D: numpy::ndarray::Dimension>(
-    array: Bound<'_, numpy::PyArray<T, D>>,
-) -> PyResult<Bound<'_, numpy::PyArray<T, D>>> {
-    let borrowed = array.try_readwrite().map_err(|error| Error::new_err(error.to_string()))?;
-    borrowed.make_nonwriteable();
-    Ok(array)
+fn read_only<T: numpy::Element, D: Dimension>(
+    array: Bound<'_, PyArray<T, D>>,
+) -> Bound<'_, PyArray<T, D>> {
+    // SAFETY: the array was made just now, so nothing else uses it.
+    let array_object = unsafe { &mut *array.as_array_ptr() };
+    array_object.fields.flags &= !NPY_ARRAY_WRITEABLE;
+    array
 }

@@ -4,6 +4,7 @@ pub(crate) mod bends;
 pub(crate) mod budget;
 pub(crate) mod contacts;
 pub(crate) mod cost;
+pub(crate) mod forces;
 pub(crate) mod meshes;
 pub(crate) mod speed;
 pub(crate) mod stability;

@@ -20,6 +20,7 @@
 //! | cost-316 | packing, hashing and publishing, compared with a step of the sheet |
 //! | threads-N | a step of the sheet with one and two threads, in wall-clock time |
 //! | contacts-SHEET-RATE | a sheet that falls flat, on a ball, or on its edge, with contacts of particles and without |
+//! | forces-SCENE | a step that measures forces on colliders and fixed particles, and one that does not |
 //! | meshes-TRIANGLES | a sheet on a ball of triangles, and on a sphere; the time to load the mesh |
 //! | stability-START-N-SUBSTEPS | a minute without a gain of 1 % in energy, else the exit code is 1; long |
 //!
@@ -37,7 +38,7 @@ mod scenes;
 
 use std::process::ExitCode;
 
-use cases::{bends, budget, contacts, cost, meshes, speed, stability, threads};
+use cases::{bends, budget, contacts, cost, forces, meshes, speed, stability, threads};
 use options::Options;
 use report::Report;
 
@@ -60,6 +61,7 @@ fn main() -> ExitCode {
     cost::run(&options, &mut report);
     threads::run(&options, &mut report);
     contacts::run(&options, &mut report);
+    forces::run(&options, &mut report);
     meshes::run(&options, &mut report);
     let are_stable = stability::run(&options, &mut report);
     if report.is_empty() {

@@ -11,7 +11,7 @@ use crate::scene::definition::softness::Softness;
 use crate::scene::model::Model;
 use crate::state::particles::Particles;
 use crate::state::tear::Torn;
-use crate::store::{Location, ParticleStore, TetherPlace};
+use crate::store::{Location, ParticleStore, TetherEnds, TetherPlace};
 
 /// The tethers of a scene; empty if it has none.
 #[derive(Debug, Clone, Default)]
@@ -192,6 +192,13 @@ impl Tethers {
         for tether in &self.all {
             store.set_tether_length(tether.place(store), f32::INFINITY);
         }
+    }
+
+    /// Returns the ends of every tether.
+    pub(crate) fn ends(&self) -> impl Iterator<Item = TetherEnds> + '_ {
+        let ends =
+            |one: &Tether| TetherEnds { particle: one.particle, slot: one.slot, root: one.root };
+        self.all.iter().map(ends)
     }
 
     /// Updates the positions of moving roots to the end of the substep.

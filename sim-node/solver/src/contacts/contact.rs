@@ -1,10 +1,12 @@
 //! Contacts: particles inside an obstacle are pushed out, slowed by friction, and bounced.
 
 mod correction;
+pub(crate) mod reaction;
 mod response;
 
 use correction::{Advanced, corrected};
 use glam::Vec3;
+use reaction::{LaneContacts, LaneReaction, Reaction};
 use response::{Contact, respond};
 
 use super::hit::{Hit, LaneHit};
@@ -15,7 +17,7 @@ use super::path::{LanePath, SubstepPath};
 use super::solid::Solid;
 use super::solid::lane_solid::LaneSolid;
 use crate::kernels::lanes::{Lanes8, Wide};
-use crate::kernels::vectors::{lane_of, load, masked, select, set_lane, store, sum};
+use crate::kernels::vectors::{difference, lane_of, load, masked, select, set_lane, store, sum};
 use crate::step::particle_block::ParticleBlock;
 use crate::step::substep::SubstepInputs;
 
@@ -72,26 +74,33 @@ impl Contacts {
         }
     }
 
-    /// Pushes free particles out of every obstacle, in order.
+    /// Pushes free particles out of every obstacle, in order. Adds what they do to each collider to
+    /// `reactions`, which are by collider, or empty if nobody asks.
     #[inline(always)]
     pub(crate) fn push_out<W: Wide>(
         &mut self,
         particles: &mut impl ParticleBlock,
         inputs: &SubstepInputs<'_>,
+        reactions: &mut [Reaction],
     ) {
         for obstacle in inputs.obstacles {
             if inputs.is_given_up() {
                 return;
             }
+            let reaction = reactions.get_mut(obstacle.collider);
             match &obstacle.solid {
                 Solid::HalfSpace(half_space) => {
-                    self.push_groups_out::<W>(particles, obstacle, half_space);
+                    self.push_groups_out::<W>(particles, (obstacle, half_space), reaction);
                 }
-                Solid::Sphere(sphere) => self.push_groups_out::<W>(particles, obstacle, sphere),
+                Solid::Sphere(sphere) => {
+                    self.push_groups_out::<W>(particles, (obstacle, sphere), reaction);
+                }
                 Solid::Capsule { .. } | Solid::Box { .. } => {
-                    self.push_each_out::<W>(particles, obstacle);
+                    self.push_each_out::<W>(particles, obstacle, reaction);
                 }
-                Solid::Mesh(mesh) => self.push_each_off::<W>(particles, (obstacle, mesh), inputs),
+                Solid::Mesh(mesh) => {
+                    self.push_each_off::<W>(particles, (obstacle, mesh), inputs, reaction);
+                }
             }
         }
     }
@@ -101,11 +110,12 @@ impl Contacts {
     fn push_groups_out<W: Wide>(
         &mut self,
         particles: &mut impl ParticleBlock,
-        obstacle: &Obstacle,
-        solid: &impl LaneSolid,
+        (obstacle, solid): (&Obstacle, &impl LaneSolid),
+        reaction: Option<&mut Reaction>,
     ) {
         let Obstacle { surface, zone, .. } = obstacle;
         let (zero, reach) = (W::splat(0.0), obstacle.solid.reach());
+        let mut sums = LaneReaction::<W>::new();
         for group in 0..particles.group_count() {
             let path = particles.paths::<W>(group);
             let is_free = zero.is_below(particles.inverse_masses::<W>(group));
@@ -138,15 +148,29 @@ impl Contacts {
             let bounce = masked(response.bounce, is_hit);
             store(sum(load::<W>(&eight.bounces), bounce), &mut eight.bounces);
             W::select(is_hit, W::splat(1.0), touched).store(&mut eight.touched, 0);
+            if reaction.is_some() {
+                let lost = difference(difference(before, response.left), bounce);
+                let inverse_mass = particles.inverse_masses::<W>(group);
+                let position = sum(path.start, displacement);
+                sums.add(&LaneContacts { is_hit, inverse_mass, lost, position }, surface.pivot);
+            }
+        }
+        if let Some(reaction) = reaction {
+            sums.add_to(reaction);
         }
     }
 
     /// Pushes particles out of a box or capsule, one by one.
     #[inline(always)]
-    fn push_each_out<W: Wide>(&mut self, particles: &mut impl ParticleBlock, obstacle: &Obstacle) {
+    fn push_each_out<W: Wide>(
+        &mut self,
+        particles: &mut impl ParticleBlock,
+        obstacle: &Obstacle,
+        mut reaction: Option<&mut Reaction>,
+    ) {
         for group in 0..particles.group_count() {
             if may_touch::<W>(particles, group, obstacle) {
-                self.push_group_out(particles, group, obstacle);
+                self.push_group_out(particles, group, obstacle, reaction.as_deref_mut());
             }
         }
     }
@@ -158,6 +182,7 @@ impl Contacts {
         particles: &mut impl ParticleBlock,
         (obstacle, mesh): (&Obstacle, &PlacedMesh),
         inputs: &SubstepInputs<'_>,
+        mut reaction: Option<&mut Reaction>,
     ) {
         for group in 0..particles.group_count() {
             if !may_touch::<W>(particles, group, obstacle) {
@@ -167,7 +192,7 @@ impl Contacts {
             if inputs.is_given_up() {
                 return;
             }
-            self.push_off(particles, group, obstacle, mesh);
+            self.push_off(particles, group, (obstacle, mesh), reaction.as_deref_mut());
         }
     }
 
@@ -178,6 +203,7 @@ impl Contacts {
         particles: &mut impl ParticleBlock,
         group: usize,
         obstacle: &Obstacle,
+        mut reaction: Option<&mut Reaction>,
     ) {
         for index in 8 * group..8 * group + 8 {
             if particles.inverse_mass(index) == 0.0 {
@@ -192,7 +218,8 @@ impl Contacts {
                 let rounding = rounding(&LanePath::from(&path), obstacle.solid.reach());
                 let (surface, bounced) = (&obstacle.surface, 0.0);
                 let contact = SingleContact { index, path, hit, rounding, surface, bounced };
-                self.resolve(particles, &contact);
+                self.resolve(particles, &contact, reaction.as_deref_mut());
+                count(reaction.as_deref_mut());
             }
         }
     }
@@ -203,8 +230,8 @@ impl Contacts {
         &mut self,
         particles: &mut impl ParticleBlock,
         group: usize,
-        obstacle: &Obstacle,
-        mesh: &PlacedMesh,
+        (obstacle, mesh): (&Obstacle, &PlacedMesh),
+        mut reaction: Option<&mut Reaction>,
     ) {
         for index in 8 * group..8 * group + 8 {
             let path = particles.path(index);
@@ -227,10 +254,16 @@ impl Contacts {
                     room = mesh.room(&path);
                     triangles = mesh.list(&mut self.near_meshes, number, &room);
                 }
-                match mesh.stop(&path, &room, &triangles, push_count) {
+                let stop = mesh.stop(&path, &room, &triangles, push_count);
+                if stop.is_some() && push_count == 0 {
+                    count(reaction.as_deref_mut());
+                }
+                match stop {
                     None => break,
                     Some(Stop::Hold) => {
-                        self.hold(particles, (index, &path), &obstacle.surface, mesh);
+                        let surface = &obstacle.surface;
+                        let reaction = reaction.as_deref_mut();
+                        self.hold(particles, (index, &path), (surface, mesh), reaction);
                         break;
                     }
                     Some(Stop::Push(hit)) => {
@@ -238,7 +271,7 @@ impl Contacts {
                         let bounced = (self.bounce(index) - before).dot(hit.normal);
                         let contact =
                             SingleContact { index, path, hit, rounding, surface, bounced };
-                        self.resolve(particles, &contact);
+                        self.resolve(particles, &contact, reaction.as_deref_mut());
                     }
                 }
             }
@@ -250,25 +283,33 @@ impl Contacts {
         &mut self,
         particles: &mut impl ParticleBlock,
         (index, path): (usize, &SubstepPath),
-        surface: &Surface,
-        mesh: &PlacedMesh,
+        (surface, mesh): (&Surface, &PlacedMesh),
+        reaction: Option<&mut Reaction>,
     ) {
         let displacement = mesh.held_displacement(path.start);
+        let before = self.left(index).unwrap_or(path.displacement);
         particles.set_displacement(index, displacement);
-        let left = surface.displacement_at((path.start + displacement).to_array());
+        let position = path.start + displacement;
+        let left = surface.displacement_at(position.to_array());
         set_lane(&mut self.groups[index / 8].displacements, index % 8, left);
         self.touch(index);
+        if let Some(reaction) = reaction {
+            let (mass, lost) = (1.0 / particles.inverse_mass(index), before - Vec3::from(left));
+            reaction.add(mass, lost, position - surface.pivot);
+        }
     }
 
     /// Pushes one particle out.
-    fn resolve(&mut self, particles: &mut impl ParticleBlock, contact: &SingleContact<'_>) {
+    fn resolve(
+        &mut self,
+        particles: &mut impl ParticleBlock,
+        contact: &SingleContact<'_>,
+        reaction: Option<&mut Reaction>,
+    ) {
         let SingleContact { index, path, hit: Hit { normal, depth }, rounding, surface, bounced } =
             *contact;
         let (group, lane) = (index / 8, index % 8);
-        let eight = &mut self.groups[group];
-        let displacement = path.displacement.to_array();
-        let is_touched = eight.touched[lane] > 0.0;
-        let before = if is_touched { lane_of(&eight.displacements, lane) } else { displacement };
+        let before = self.left(index).unwrap_or(path.displacement);
         let response = respond(
             surface,
             &Contact {
@@ -276,16 +317,30 @@ impl Contacts {
                 normal: normal.to_array(),
                 depth,
                 rounding,
-                before,
+                before: before.to_array(),
                 predicted: particles.predicted(index).to_array(),
                 bounced,
             },
         );
-        particles.set_displacement(index, Vec3::from_array(response.displacement));
+        let displacement = Vec3::from_array(response.displacement);
+        particles.set_displacement(index, displacement);
+        let eight = &mut self.groups[group];
         set_lane(&mut eight.displacements, lane, response.left);
         let bounce = sum(lane_of(&eight.bounces, lane), response.bounce);
         set_lane(&mut eight.bounces, lane, bounce);
         self.touch(index);
+        if let Some(reaction) = reaction {
+            let after = Vec3::from_array(sum(response.left, response.bounce));
+            let (mass, position) = (1.0 / particles.inverse_mass(index), path.start + displacement);
+            reaction.add(mass, before - after, position - surface.pivot);
+        }
+    }
+
+    /// Displacement that earlier contacts leave a particle, without bounces. None before the first one.
+    fn left(&self, index: usize) -> Option<Vec3> {
+        let eight = &self.groups[index / 8];
+        let is_touched = eight.touched[index % 8] > 0.0;
+        is_touched.then(|| Vec3::from_array(lane_of(&eight.displacements, index % 8)))
     }
 
     /// Displacement that the bounces of a particle add.
@@ -324,6 +379,13 @@ impl Contacts {
             particles.set_paths(group, &path);
             (eight.touched, eight.bounces) = ([0.0; 8], [[0.0; 8]; 3]);
         }
+    }
+}
+
+/// Counts a particle in contact.
+fn count(reaction: Option<&mut Reaction>) {
+    if let Some(reaction) = reaction {
+        reaction.contacts += 1;
     }
 }
 

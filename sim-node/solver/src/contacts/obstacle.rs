@@ -14,6 +14,8 @@ use crate::scene::definition::collider::SceneCollider;
 /// A collider in one substep, or one face of bounds.
 #[derive(Debug, Clone)]
 pub(crate) struct Obstacle {
+    /// Index of the collider.
+    pub(crate) collider: usize,
     pub(crate) surface: Surface,
     pub(crate) solid: Solid,
     pub(crate) zone: Zone,
@@ -24,7 +26,8 @@ pub(crate) struct Obstacle {
 pub(crate) struct Surface {
     linear: Vec3,
     angular: Vec3,
-    pivot: Vec3,
+    /// Center of the collider.
+    pub(crate) pivot: Vec3,
     pub(crate) restitution: f32,
     pub(crate) friction: f32,
     /// Length of the substep in seconds.
@@ -45,11 +48,11 @@ pub(crate) fn place_obstacles(
     substep: &ContactSubstep,
 ) {
     obstacles.clear();
-    for collider in colliders {
+    for (index, collider) in colliders.iter().enumerate() {
         let surface = Surface::new(collider, substep);
         for solid in solids(collider, substep).into_iter().flatten() {
             let zone = solid.zone();
-            obstacles.push(Obstacle { surface, solid, zone });
+            obstacles.push(Obstacle { collider: index, surface, solid, zone });
         }
     }
 }

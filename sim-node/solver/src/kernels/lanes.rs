@@ -12,7 +12,7 @@ pub(crate) type Lanes8 = [f32; 8];
 /// One particle of the graph: x, y, z, inverse mass, displacement x, y, z, and 0.
 ///
 /// 32 bytes, one aligned load, within one cache line.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C, align(32))]
 pub(crate) struct PackedParticle(pub(crate) Lanes8);
 

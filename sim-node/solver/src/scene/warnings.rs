@@ -27,6 +27,7 @@ impl Scene {
             settings::fast_contacts(self, &model),
             settings::contact_without_surface(self, &model),
             settings::contact_without_mode(self),
+            settings::contact_of_nothing(self),
             constraints::tear_of_rigid(self, &model),
             constraints::tear_beyond_limit(self, &model),
             constraints::tear_by_rounding(self, &model),
@@ -35,7 +36,7 @@ impl Scene {
         ];
         let mut warnings: Vec<_> = all.into_iter().flatten().collect();
         warnings.extend(contacts::across_mesh(self, &model));
-        warnings.extend(contacts::thick(self, &model));
+        warnings.extend(contacts::thickness(self, &model));
         warnings.extend(bending::unreached(self, &model));
         warnings.extend(bending::missing_hinges(self));
         warnings.extend(shapes::without_length(self));

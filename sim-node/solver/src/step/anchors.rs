@@ -8,7 +8,7 @@ use super::drive::{DriveTarget, drive_towards};
 use crate::frame::{Frame, Pose};
 use crate::scene::definition::anchor::{SceneAnchor, Waypoint};
 use crate::scene::definition::element::SceneParticle;
-use crate::state::particles::Particles;
+use crate::state::particles::{Particle, Particles};
 use crate::store::ParticleStore;
 
 /// All anchors of a scene.
@@ -40,6 +40,9 @@ struct Follower {
     /// Position at load.
     start: Vec3,
 }
+
+/// Flags of particles that an anchor does not drive.
+const HELD: u32 = ParticleFlags::PINNED | ParticleFlags::FROZEN;
 
 impl Anchors {
     pub(crate) fn new(scene: &[SceneAnchor], particles: &[SceneParticle]) -> Self {
@@ -94,7 +97,6 @@ impl Anchors {
         substeps_left: u32,
         reach: f32,
     ) {
-        const HELD: u32 = ParticleFlags::PINNED | ParticleFlags::FROZEN;
         for (follower, target) in self.followers.iter().zip(&self.targets) {
             if particles.states[follower.particle as usize].flags & HELD == 0 {
                 let location = store.location(follower.particle);
@@ -102,6 +104,25 @@ impl Anchors {
                 drive_towards(store, location, target, reach);
             }
         }
+    }
+}
+
+impl Anchors {
+    /// Center of a frame at the end of the running step.
+    pub(crate) fn center(&self, anchor: usize) -> Vec3 {
+        self.paths[anchor].origin + self.frames[anchor].translation
+    }
+
+    /// Returns the particles that an anchor drives, and no client holds.
+    pub(crate) fn driven_particles<'a>(
+        &'a self,
+        anchor: usize,
+        states: &'a [Particle],
+    ) -> impl Iterator<Item = u32> + 'a {
+        let own = self.followers.iter().filter(move |one| one.anchor as usize == anchor);
+        own.map(|one| one.particle).filter(|particle| {
+            states[*particle as usize].flags & (HELD | ParticleFlags::GRABBED) == 0
+        })
     }
 }
 

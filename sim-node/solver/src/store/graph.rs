@@ -3,13 +3,16 @@
 mod batch;
 mod bends;
 pub(crate) mod block;
+pub(crate) mod forces;
 mod group;
 mod indices;
+mod measure;
 mod wind;
 
 use batch::Batch;
 use bends::GraphBends;
 use block::{BLOCK_GROUPS, BlockWork, GraphBlock, PackedTether};
+use forces::{GraphForces, MovedParticles};
 use group::{ConstraintGroup, part_count};
 use indices::find_particle;
 use wind::{GraphWindWork, TriangleGroup, triangle_groups};
@@ -64,6 +67,7 @@ pub(crate) struct Graph {
     /// Softness of all constraints, unless they differ.
     softness: PassSoftness,
     schedule: Schedule,
+    forces: GraphForces,
 }
 
 /// A constraint between particles of the graph.
@@ -228,6 +232,9 @@ impl Graph {
         pass: Pass,
         inputs: &SubstepInputs<'_>,
     ) -> bool {
+        if self.indices.is_empty() {
+            return false;
+        }
         let schedule = std::mem::take(&mut self.schedule);
         let stages = schedule.of_pass(pass);
         let mut is_marked = false;
@@ -240,8 +247,7 @@ impl Graph {
             match stage {
                 Stage::Project => is_marked |= self.project(workers, group, pass),
                 Stage::Bend => {
-                    let pass = BendPass::new(pass, inputs.relaxation);
-                    self.bends.project(group, &mut self.particles, workers, pass);
+                    self.bend(workers, group, BendPass::new(pass, inputs.relaxation));
                 }
                 Stage::LimitStretch => self.limit_stretch(workers, group),
                 _ => self.run_particle_stages(workers, run, inputs),
@@ -275,6 +281,9 @@ impl Graph {
             gains: if self.layout.is_wind_used { &self.gains } else { &[] },
             tethers: &self.tethers,
             tether_count: self.layout.scene.tethers,
+            tether_pulls: &mut self.forces.tether_pulls,
+            reaction_count: self.forces.reaction_count,
+            reactions: &mut self.forces.reactions,
         };
         let parts = all.chunks(length).map(Some);
         let work = |part: &mut Option<GraphBlock<'_>>, scratch: &mut WorkerScratch| {
@@ -301,6 +310,13 @@ impl Graph {
         }
     }
 
+    fn bend(&mut self, workers: &mut Workers, group: usize, pass: BendPass) {
+        let Self { particles, bends, forces, .. } = self;
+        let first = forces.projections.of_bends(group);
+        let moved = MovedParticles { particles, pulls: &mut forces.pulls, first };
+        bends.project(group, moved, workers, pass);
+    }
+
     fn limit_stretch(&mut self, workers: &mut Workers, group: usize) {
         let (batch, columns) = self.batch(group);
         let limit = columns.stretch_limit(&batch.group.lane_groups);
@@ -309,12 +325,14 @@ impl Graph {
 
     fn batch(&mut self, group: usize) -> (Batch<'_>, ConstraintColumns<'_>) {
         let length = 8 * self.ends.len();
-        let Self { particles, ends, inverse_masses, columns, groups, layout, .. } = self;
+        let Self { particles, ends, inverse_masses, columns, groups, layout, forces, .. } = self;
+        let first = forces.projections.of_constraints(group);
+        let moved = MovedParticles { particles, pulls: &mut forces.pulls, first };
         let group = &groups[group];
         let lane_groups = group.lane_groups.clone();
         let (ends, inverse_masses) = (&ends[lane_groups.clone()], &inverse_masses[lane_groups]);
         let columns = ConstraintColumns::new(columns, length, layout.constraints);
-        (Batch { group, particles, ends, inverse_masses }, columns)
+        (Batch { group, moved, ends, inverse_masses }, columns)
     }
 
     pub(crate) fn position(&self, index: usize) -> [f32; 3] {

@@ -6,9 +6,11 @@
 //! row with eight of the other; columns of constraints within a row are separated in registers.
 
 mod band;
+mod band_forces;
 mod bend_layout;
 mod bends;
 mod ends;
+mod measure;
 mod paths;
 mod row;
 mod row_layout;
@@ -18,6 +20,7 @@ mod wind;
 use std::ops::Range;
 
 use band::{Band, PassSweep, SweepWork};
+use band_forces::SheetForces;
 use bend_layout::BendLayout;
 use row_layout::{LINE_LENGTH, RowLayout};
 use span::Span;
@@ -60,6 +63,7 @@ pub(crate) struct Patch {
     lines: Vec<CacheLine>,
     column_order: ColumnOrder,
     schedule: Schedule,
+    forces: SheetForces,
 }
 
 /// The state fields of a row.
@@ -91,6 +95,7 @@ impl Patch {
             lines: Vec::new(),
             column_order: ColumnOrder::default(),
             schedule: Schedule::default(),
+            forces: SheetForces::default(),
         }
     }
 
@@ -220,11 +225,25 @@ impl Patch {
         (stages, pass): (&[ScheduledStage], Pass),
         inputs: &SubstepInputs<'_>,
     ) -> bool {
-        let layout = &self.layout;
+        let (layout, forces) = (&self.layout, &mut self.forces);
+        let is_measured = forces.is_measured();
         let numbers: &mut [f32] = bytemuck::cast_slice_mut(&mut self.lines);
         let kernels = workers.kernels;
         let reach = stages.iter().map(|stage| stage.reach).sum();
         let count = layout.band_count(workers.count(), reach);
+        let run = |band: Band<'_>, span, scratch: &mut WorkerScratch| {
+            let sweep = PassSweep { stages, pass, inputs, scratch };
+            if is_measured {
+                kernels.run(SweepWork::<true> { band, span, sweep })
+            } else {
+                kernels.run(SweepWork::<false> { band, span, sweep })
+            }
+        };
+        if count == 1 {
+            let band = Band { numbers, first: 0, layout, forces: forces.all(layout) };
+            let span = Span::new(0..layout.rows, layout.rows);
+            return run(band, span, workers.own_scratch());
+        }
         let cuts = (0..=count).map(|band| band * layout.rows / count);
         let spans = cuts
             .clone()
@@ -235,17 +254,17 @@ impl Patch {
         let mut is_marked = false;
         let mut round = |spans: &mut dyn Iterator<Item = (Range<usize>, Span)>| {
             let work = |part: &mut BandPart<'_>, scratch: &mut WorkerScratch| {
-                let band = Band { numbers: part.numbers, first: part.first, layout };
-                let sweep = PassSweep { stages, pass, inputs, scratch };
-                part.is_marked = kernels.run(SweepWork { band, span: part.span.clone(), sweep });
+                if let Some(band) = part.band.take() {
+                    part.is_marked = run(band, part.span.clone(), scratch);
+                }
             };
-            let parts = BandPart::split(numbers, layout.row_length, spans);
+            let whole =
+                Band { numbers: &mut *numbers, first: 0, layout, forces: forces.all(layout) };
+            let parts = BandPart::split(whole, spans);
             workers.for_each(parts, work, |part| is_marked |= part.is_marked);
         };
         round(&mut spans.into_iter());
-        if count > 1 {
-            round(&mut seams.into_iter());
-        }
+        round(&mut seams.into_iter());
         is_marked
     }
 
@@ -332,27 +351,24 @@ impl Patch {
 
 /// Rows that one worker processes.
 struct BandPart<'a> {
-    numbers: &'a mut [f32],
-    /// Index of the first row.
-    first: usize,
+    /// None once they are processed.
+    band: Option<Band<'a>>,
     span: Span,
     is_marked: bool,
 }
 
 impl<'a> BandPart<'a> {
-    /// Splits ascending ranges of rows off the numbers of a sheet.
+    /// Splits ascending ranges of rows off a sheet.
     fn split(
-        numbers: &'a mut [f32],
-        row_length: usize,
+        whole: Band<'a>,
         spans: impl Iterator<Item = (Range<usize>, Span)>,
     ) -> impl Iterator<Item = Self> {
-        let (mut rest, mut next) = (numbers, 0);
-        spans.map(move |(rows, span)| {
-            let (_, from) =
-                std::mem::take(&mut rest).split_at_mut((rows.start - next) * row_length);
-            let (numbers, others) = from.split_at_mut(rows.len() * row_length);
-            (rest, next) = (others, rows.end);
-            Self { numbers, first: rows.start, span, is_marked: false }
+        let mut rest = Some(whole);
+        spans.map_while(move |(rows, span)| {
+            let (_, from) = rest.take()?.split_at(rows.start);
+            let (band, others) = from.split_at(rows.end);
+            rest = Some(others);
+            Some(Self { band: Some(band), span, is_marked: false })
         })
     }
 }

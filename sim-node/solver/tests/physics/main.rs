@@ -11,7 +11,7 @@ mod bending;
 mod colliders;
 mod constraints;
 mod contacts;
-mod cuts;
+mod forces;
 mod hardening;
 mod motion;
 mod order;

@@ -1,5 +1,7 @@
 //! Tearing: exactly above its threshold, at every rate, and for good.
 
+mod cuts;
+
 use sim_solver::TearCause;
 
 use super::{assert_near, distance, solver, step, stepped};

@@ -28,12 +28,16 @@ pub(crate) struct SelectionArgs {
     /// `recorder simulate` computes the others, bit for bit
     #[arg(long, conflicts_with_all = ["topics", "every"])]
     only_commands: bool,
+    /// Record the forces on colliders, anchors and fixed particles in each step, too (/forces). The node
+    /// computes them only while a program reads them
+    #[arg(long)]
+    forces: bool,
 }
 
 impl Default for SelectionArgs {
     fn default() -> Self {
         let (topics, exclude) = (Vec::new(), Vec::new());
-        Self { topics, exclude, every: NonZeroU32::MIN, only_commands: false }
+        Self { topics, exclude, every: NonZeroU32::MIN, only_commands: false, forces: false }
     }
 }
 
@@ -44,7 +48,12 @@ impl SelectionArgs {
         };
         let left_out: Vec<_> = ContentSelection::OPTIONAL.into_iter().filter(is_left_out).collect();
         let selection = ContentSelection::new(self.every, &left_out);
-        if self.only_commands { selection.with_only_commands() } else { selection }
+        let selection = if self.only_commands { selection.with_only_commands() } else { selection };
+        if self.forces || self.topics.contains(&Topic::Forces) {
+            selection.with_forces()
+        } else {
+            selection
+        }
     }
 
     /// Returns a topic that is left out although the commands are useless without it.
@@ -67,6 +76,9 @@ fn optional_topic(text: &str) -> Result<Topic, String> {
     let topic = topic(text)?;
     if ContentSelection::OPTIONAL.contains(&topic) {
         return Ok(topic);
+    }
+    if topic == Topic::Forces {
+        return Err("only a recording with --forces has it".to_owned());
     }
     let names: Vec<_> = ContentSelection::OPTIONAL.map(|topic| &topic.name()[1..]).into();
     Err(format!("every reader needs it (allowed: {})", names.join(", ")))

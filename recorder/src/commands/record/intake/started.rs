@@ -2,12 +2,12 @@
 
 use recorder::simulation::{FrozenParticles, FrozenTracker};
 use recorder::{
-    AllCounts, CollidersRow, EventRow, Message, OutcomeRow, ParametersRow, StatusRow, StepRow,
-    TearsRow, Topic,
+    AllCounts, CollidersRow, EventRow, ForcesRow, Message, OutcomeRow, ParametersRow, StatusRow,
+    StepRow, TearsRow, Topic,
 };
 use sim_contract::{
-    Change, ColliderState, CollidersHeader, KeyframeHeader, LostChanges, NodeStatus, Outcome,
-    ParticleState, SnapshotFlags, SnapshotHeader, State,
+    Change, ColliderState, CollidersHeader, ForceRow, ForcesHeader, KeyframeHeader, LostChanges,
+    NodeStatus, Outcome, ParticleState, SnapshotFlags, SnapshotHeader, State,
 };
 
 use crate::commands::record::accepted::{Accepted, RunEnd};
@@ -81,6 +81,8 @@ pub(super) struct Started {
     state_gaps: u64,
     /// Number of the next list of colliders, modulo 2^32; `None` before the first.
     next_collider_list: Option<u32>,
+    /// Step of the next forces; `None` before the first.
+    next_forces_step: Option<u64>,
     /// Number of the next change of the members; `None` before the first status.
     next_member_change: Option<u64>,
     /// The changes that the tap dropped before the start.
@@ -115,6 +117,7 @@ impl Started {
             torn_count: u32::try_from(torn_before.len()).unwrap_or(u32::MAX),
             state_gaps: previous.map_or(0, |previous| previous.missing_before(header)),
             next_collider_list: None,
+            next_forces_step: None,
             next_member_change: previous_of_run.and_then(|previous| previous.next_member_change),
             lost_before,
             frozen: FrozenTracker::default(),
@@ -234,6 +237,7 @@ impl Started {
             Change::Parameters(header, values) => {
                 Some(Message::Parameters(ParametersRow { step: header.step, values: *values }))
             }
+            Change::Forces(header, rows) => self.forces_row(header, rows),
             Change::Keyframe(header, bytes) => self.keyframe_row(header, bytes),
         }
     }
@@ -251,6 +255,19 @@ impl Started {
         // A collider of an unknown shape cannot be recorded.
         self.counts[Topic::Colliders].gaps += u64::from(missing) + u64::from(row.is_none());
         row.filter(|row| !row.colliders.is_empty()).map(Message::Colliders)
+    }
+
+    /// Returns the row of forces, unless they precede the file.
+    fn forces_row(&mut self, header: &ForcesHeader, rows: &[ForceRow]) -> Option<Message> {
+        let ForcesHeader { step, .. } = *header;
+        // An owner publishes those of each step. A replay lacks those that its recording lacks.
+        let is_replay = self.last.flags & SnapshotFlags::REPLAY != 0;
+        let missing = step.saturating_sub(self.next_forces_step.unwrap_or(step));
+        self.next_forces_step = Some(step + 1);
+        let row = ForcesRow::new(step, rows);
+        let gaps = if is_replay { 0 } else { missing };
+        self.counts[Topic::Forces].gaps += gaps + u64::from(row.is_none());
+        row.filter(|row| row.step >= self.first_step).map(Message::Forces)
     }
 
     /// Returns the row of a keyframe, unless it is in the file. The first one may arrive twice: after
@@ -352,6 +369,7 @@ fn is_before(change: &Change, step: u64) -> bool {
         Change::Colliders(header, _) => header.step < step,
         Change::Tears(header, _) => header.step < step,
         Change::Parameters(header, _) => header.step < step,
+        Change::Forces(header, _) => header.step < step,
         Change::Keyframe(header, _) => header.step < step,
     }
 }

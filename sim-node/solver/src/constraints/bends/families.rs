@@ -61,14 +61,19 @@ impl BendFamily {
     }
 
     /// Group, in the order of projection of all families, of a bend at a row and column.
-    #[allow(clippy::cast_possible_truncation, reason = "at most 9")]
     pub(crate) const fn group(self, row: usize, column: usize) -> u32 {
+        self.group_of(self.part(row, column))
+    }
+
+    /// Group, in the order of projection of all families, of a group within the family.
+    #[allow(clippy::cast_possible_truncation, reason = "at most 9")]
+    pub(crate) const fn group_of(self, part: usize) -> u32 {
         let first = match self {
             Self::Down => 0,
             Self::Across => 3,
             Self::Twist => 6,
         };
-        (first + self.part(row, column)) as u32
+        (first + part) as u32
     }
 
     /// The family of a group.

@@ -45,6 +45,14 @@ pub(super) fn contact_without_mode(scene: &Scene) -> Option<String> {
     })
 }
 
+pub(super) fn contact_of_nothing(scene: &Scene) -> Option<String> {
+    let touches = !scene.particles.is_empty() || scene.generators.iter().any(|one| one.contact);
+    (scene.contact.mode != ContactMode::Off && !touches).then(|| {
+        "contact.mode has no effect: every [[generate]] has contact = false; remove it from those that shall touch"
+            .to_owned()
+    })
+}
+
 /// Returns the largest fall in a substep, in contact distances, at which cloth does not pass through itself.
 fn fall_max(mode: ContactMode) -> f32 {
     match mode {

@@ -1,5 +1,6 @@
 //! The projection of the constraints of one group.
 
+use super::forces::MovedParticles;
 use super::group::{ConstraintGroup, part_count};
 use crate::constraints::projection::{LaneIndex, Projection};
 use crate::constraints::projection_block::{BLOCK_LENGTH, ProjectionBlock};
@@ -16,27 +17,44 @@ const BATCHED_MIN: usize = 4;
 /// Constraints of one group, and the particles that they move.
 pub(crate) struct Batch<'a> {
     pub(crate) group: &'a ConstraintGroup,
-    pub(crate) particles: &'a mut [PackedParticle],
+    pub(crate) moved: MovedParticles<'a>,
     pub(crate) ends: &'a [[[u32; 8]; 2]],
     pub(crate) inverse_masses: &'a [[Lanes8; 2]],
 }
 
 impl Batch<'_> {
     /// Projects every constraint once. Returns true if any was marked as torn.
+    pub(crate) fn project(
+        mut self,
+        mut projection: impl Projection + Send,
+        workers: &mut Workers,
+    ) -> bool {
+        let ConstraintGroup { count, is_independent, .. } = *self.group;
+        if !is_independent {
+            return self.project_serially(projection);
+        }
+        self.moved.note(0);
+        let is_marked = if count < BATCHED_MIN || workers.kernels == Kernels::Reference {
+            (0..count).for_each(|place| self.project_one(&mut projection, place));
+            projection.is_marked()
+        } else {
+            self.project_together(projection, workers)
+        };
+        self.moved.add_changes(0);
+        is_marked
+    }
+
+    /// Projects the constraints of an independent group in eights.
     #[allow(unsafe_code, reason = "only this function knows that the constraints are independent")]
-    pub(crate) fn project<T: Projection + Send>(
-        self,
+    fn project_together<T: Projection + Send>(
+        &mut self,
         mut projection: T,
         workers: &mut Workers,
     ) -> bool {
-        let is_batched = self.group.is_independent && self.group.count >= BATCHED_MIN;
-        if !is_batched || workers.kernels == Kernels::Reference {
-            return self.project_singly(projection);
-        }
         // SAFETY: no two constraints of an independent group share a particle, and only the last
         // lane group contains the particle of the padding.
-        let particles = unsafe { SharedSlice::new(self.particles) };
-        let Self { ends, inverse_masses, .. } = self;
+        let particles = unsafe { SharedSlice::new(&mut *self.moved.particles) };
+        let Self { ends, inverse_masses, .. } = *self;
         let whole = BatchPart { ends, inverse_masses, particles, kernels: workers.kernels };
         if part_count(self.group.count, workers.count()) == 1 {
             whole.project(&mut projection, workers.own_scratch());
@@ -45,23 +63,32 @@ impl Batch<'_> {
         ProjectedPart { part: whole, projection }.project_by_all(workers)
     }
 
-    fn project_singly(self, mut projection: impl Projection) -> bool {
+    /// Projects constraints that share particles.
+    fn project_serially(&mut self, mut projection: impl Projection) -> bool {
         for place in 0..self.group.count {
-            let index = LaneIndex { group: place / 8, lane: place % 8 };
-            let ([a, b], [w_a, w_b]) = (&self.ends[index.group], &self.inverse_masses[index.group]);
-            let (a, b) = (a[index.lane] as usize, b[index.lane] as usize);
-            let (w_a, w_b) = (w_a[index.lane], w_b[index.lane]);
-            let difference = |axis: usize| self.particles[b].0[axis] - self.particles[a].0[axis];
-            let separation = Separation::new(axes(difference), axes(|axis| difference(4 + axis)));
-            let scale = projection.scale(index, &separation.squared, w_a + w_b);
-            let correction = correction(separation.vector, scale);
-            let (change_a, change_b) = (correction.displacement(w_a), correction.displacement(w_b));
-            for axis in 0..3 {
-                self.particles[a].0[4 + axis] += change_a[axis];
-                self.particles[b].0[4 + axis] -= change_b[axis];
-            }
+            self.moved.note(place);
+            self.project_one(&mut projection, place);
+            self.moved.add_changes(place);
         }
         projection.is_marked()
+    }
+
+    #[inline(always)]
+    fn project_one(&mut self, projection: &mut impl Projection, place: usize) {
+        let particles = &mut *self.moved.particles;
+        let index = LaneIndex { group: place / 8, lane: place % 8 };
+        let ([a, b], [w_a, w_b]) = (&self.ends[index.group], &self.inverse_masses[index.group]);
+        let (a, b) = (a[index.lane] as usize, b[index.lane] as usize);
+        let (w_a, w_b) = (w_a[index.lane], w_b[index.lane]);
+        let difference = |axis: usize| particles[b].0[axis] - particles[a].0[axis];
+        let separation = Separation::new(axes(difference), axes(|axis| difference(4 + axis)));
+        let scale = projection.scale(index, &separation.squared, w_a + w_b);
+        let correction = correction(separation.vector, scale);
+        let (change_a, change_b) = (correction.displacement(w_a), correction.displacement(w_b));
+        for axis in 0..3 {
+            particles[a].0[4 + axis] += change_a[axis];
+            particles[b].0[4 + axis] -= change_b[axis];
+        }
     }
 }
 

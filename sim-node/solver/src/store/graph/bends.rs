@@ -1,5 +1,6 @@
 //! The bends of the graph, in lane groups of eight that share no particle.
 
+use super::forces::MovedParticles;
 use super::group::{ConstraintGroup, part_count};
 use super::indices::find_particle;
 use crate::constraints::bends::BendShape;
@@ -123,23 +124,21 @@ impl GraphBends {
     }
 
     /// Projects the bends of a group once.
-    #[allow(unsafe_code, reason = "only this function knows that the bends are independent")]
     pub(crate) fn project(
         &mut self,
         group: usize,
-        particles: &mut [PackedParticle],
+        mut moved: MovedParticles<'_>,
         workers: &mut Workers,
         pass: BendPass,
     ) {
         let ConstraintGroup { lane_groups, count, is_independent } = &self.groups[group];
-        let (range, count) = (lane_groups.clone(), *count);
-        let is_batched = *is_independent && count >= BATCHED_MIN;
+        let (range, count, is_independent) = (lane_groups.clone(), *count, *is_independent);
         let multipliers = self.multipliers.each_mut().map(|column| column.get_mut(range.clone()));
         let multipliers = match multipliers {
             [Some(x), Some(y), Some(z)] if pass.has_multipliers => Some([x, y, z]),
             _ => None,
         };
-        let run = BendRun {
+        let mut run = BendRun {
             particles: &self.particles[range.clone()],
             coefficients: &self.coefficients[range.clone()],
             inverse_masses: &self.inverse_masses[range.clone()],
@@ -151,14 +150,17 @@ impl GraphBends {
                 share: pass.share,
             },
         };
-        if !is_batched || workers.kernels == Kernels::Reference {
-            run.project_singly(count, particles);
+        if !is_independent {
+            run.project_serially(count, &mut moved);
             return;
         }
-        // SAFETY: no two bends of an independent group share a particle, and only the last lane group
-        // contains the particle of the padding.
-        let particles = unsafe { SharedSlice::new(particles) };
-        run.project_by_all(count, &particles, workers);
+        moved.note(0);
+        if count < BATCHED_MIN || workers.kernels == Kernels::Reference {
+            (0..count).for_each(|place| run.project_one(place, moved.particles));
+        } else {
+            run.project_together(count, moved.particles, workers);
+        }
+        moved.add_changes(0);
     }
 }
 
@@ -172,36 +174,58 @@ struct BendRun<'a> {
 }
 
 impl BendRun<'_> {
-    fn project_singly(mut self, count: usize, particles: &mut [PackedParticle]) {
+    /// Projects bends that share particles.
+    fn project_serially(&mut self, count: usize, moved: &mut MovedParticles<'_>) {
         for place in 0..count {
-            let index = LaneIndex { group: place / 8, lane: place % 8 };
-            let lane = |numbers: &[Lanes8; 4]| numbers.map(|lanes| lanes[index.lane]);
-            let indices = self.particles[index.group].map(|lanes| lanes[index.lane] as usize);
-            let coefficients = lane(&self.coefficients[index.group]);
-            let inverse_masses = lane(&self.inverse_masses[index.group]);
-            let arm = |end: usize| {
-                let (from, to) = (particles[indices[1]].0, particles[indices[end]].0);
-                Arm {
-                    coefficient: coefficients[end],
-                    start: axes(|axis| to[axis] - from[axis]),
-                    change: axes(|axis| to[4 + axis] - from[4 + axis]),
-                }
-            };
-            let arms = [arm(0), arm(2), arm(3)];
-            let mut value = bend_value(&arms);
-            if let Some(rests) = self.rests {
-                let [rest, area_ratio] = rests[index.group].map(|lanes| lanes[index.lane]);
-                value = subtract_rest(value, &arms, HingeRest { rest, area_ratio });
+            moved.note(place);
+            self.project_one(place, moved.particles);
+            moved.add_changes(place);
+        }
+    }
+
+    #[inline(always)]
+    fn project_one(&mut self, place: usize, particles: &mut [PackedParticle]) {
+        let index = LaneIndex { group: place / 8, lane: place % 8 };
+        let lane = |numbers: &[Lanes8; 4]| numbers.map(|lanes| lanes[index.lane]);
+        let indices = self.particles[index.group].map(|lanes| lanes[index.lane] as usize);
+        let coefficients = lane(&self.coefficients[index.group]);
+        let inverse_masses = lane(&self.inverse_masses[index.group]);
+        let arm = |end: usize| {
+            let (from, to) = (particles[indices[1]].0, particles[indices[end]].0);
+            Arm {
+                coefficient: coefficients[end],
+                start: axes(|axis| to[axis] - from[axis]),
+                change: axes(|axis| to[4 + axis] - from[4 + axis]),
             }
-            let weight = bend_weight(&coefficients, &inverse_masses);
-            let change = self.projection.change(index, value, weight);
-            for end in 0..4 {
-                let share = coefficients[end] * inverse_masses[end];
-                for (axis, along) in change.into_iter().enumerate() {
-                    particles[indices[end]].0[4 + axis] += share * along;
-                }
+        };
+        let arms = [arm(0), arm(2), arm(3)];
+        let mut value = bend_value(&arms);
+        if let Some(rests) = self.rests {
+            let [rest, area_ratio] = rests[index.group].map(|lanes| lanes[index.lane]);
+            value = subtract_rest(value, &arms, HingeRest { rest, area_ratio });
+        }
+        let weight = bend_weight(&coefficients, &inverse_masses);
+        let change = self.projection.change(index, value, weight);
+        for end in 0..4 {
+            let share = coefficients[end] * inverse_masses[end];
+            for (axis, along) in change.into_iter().enumerate() {
+                particles[indices[end]].0[4 + axis] += share * along;
             }
         }
+    }
+
+    /// Projects the bends of an independent group in eights.
+    #[allow(unsafe_code, reason = "only this function knows that the bends are independent")]
+    fn project_together(
+        self,
+        count: usize,
+        particles: &mut [PackedParticle],
+        workers: &mut Workers,
+    ) {
+        // SAFETY: no two bends of an independent group share a particle, and only the last lane group
+        // contains the particle of the padding.
+        let particles = unsafe { SharedSlice::new(particles) };
+        self.project_by_all(count, &particles, workers);
     }
 
     /// Divides the run among the workers that its `count` bends are worth.

@@ -5,6 +5,7 @@ use glam::Vec3;
 use crate::constraints::separation::RestLength;
 use crate::constraints::tether_pull::{Tethered, tether_excess};
 use crate::contacts::contact::Contacts;
+use crate::contacts::contact::reaction::Reaction;
 use crate::contacts::path::{LanePath, SubstepPath};
 use crate::kernels::lanes::{LaneWork, Lanes8, PackedParticle, Wide};
 use crate::kernels::vectors::{lane_of, load, store};
@@ -39,6 +40,13 @@ pub(crate) struct GraphBlock<'a> {
     pub(crate) tethers: &'a [PackedTether],
     /// Tethers of each particle.
     pub(crate) tether_count: usize,
+    /// By particle and tether, or empty if nobody asks for forces: mass times the displacement that the tether has
+    /// taken in this step.
+    pub(crate) tether_pulls: &'a mut [[f32; 3]],
+    /// By [`BLOCK_GROUPS`] groups, then by collider; empty if nobody asks for forces.
+    pub(crate) reactions: &'a mut [Reaction],
+    /// Number of reactions of a block.
+    pub(crate) reaction_count: usize,
 }
 
 impl<'a> GraphBlock<'a> {
@@ -55,23 +63,43 @@ impl<'a> GraphBlock<'a> {
 
     /// Splits after `count` groups, or at the end if there are fewer.
     fn split_at(self, count: usize) -> (GraphBlock<'a>, GraphBlock<'a>) {
-        let Self { first, particles, predicted, gains, tethers, tether_count } = self;
-        let end = |length: usize| count.min(length);
-        let (first_particles, particles) = particles.split_at_mut(end(particles.len()));
-        let (first_predicted, predicted) = predicted.split_at_mut(end(predicted.len()));
-        let (first_gains, gains) = gains.split_at(end(gains.len()));
-        let tethers_end = tethers.len().min(8 * tether_count * count);
-        let (first_tethers, tethers) = tethers.split_at(tethers_end);
-        let second = first + 8 * first_particles.len();
-        let first = GraphBlock {
-            first,
-            particles: first_particles,
-            predicted: first_predicted,
-            gains: first_gains,
-            tethers: first_tethers,
+        let Self { tether_count, reaction_count, .. } = self;
+        let end = |length: usize, wanted: usize| wanted.min(length);
+        let (particles, other_particles) =
+            self.particles.split_at_mut(end(self.particles.len(), count));
+        let (predicted, other_predicted) =
+            self.predicted.split_at_mut(end(self.predicted.len(), count));
+        let (gains, other_gains) = self.gains.split_at(end(self.gains.len(), count));
+        let (tethers, other_tethers) =
+            self.tethers.split_at(end(self.tethers.len(), 8 * tether_count * count));
+        let (tether_pulls, other_tether_pulls) =
+            self.tether_pulls.split_at_mut(end(self.tether_pulls.len(), 8 * tether_count * count));
+        let reactions_end = reaction_count * count.div_ceil(BLOCK_GROUPS);
+        let (reactions, other_reactions) =
+            self.reactions.split_at_mut(end(self.reactions.len(), reactions_end));
+        let other = GraphBlock {
+            first: self.first + 8 * particles.len(),
+            particles: other_particles,
+            predicted: other_predicted,
+            gains: other_gains,
+            tethers: other_tethers,
             tether_count,
+            tether_pulls: other_tether_pulls,
+            reactions: other_reactions,
+            reaction_count,
         };
-        (first, GraphBlock { first: second, particles, predicted, gains, tethers, tether_count })
+        let first = GraphBlock {
+            first: self.first,
+            particles,
+            predicted,
+            gains,
+            tethers,
+            tether_count,
+            tether_pulls,
+            reactions,
+            reaction_count,
+        };
+        (first, other)
     }
 }
 
@@ -88,8 +116,9 @@ impl LaneWork for BlockWork<'_, '_> {
 
     #[inline(always)]
     fn run<W: Wide>(mut self) {
+        let reactions = std::mem::take(&mut self.block.reactions);
         for ScheduledStage { stage, .. } in self.stages {
-            run_stage::<W>(*stage, &mut self.block, self.inputs, self.contacts);
+            run_stage::<W>(*stage, &mut self.block, self.inputs, self.contacts, reactions);
         }
     }
 }
@@ -169,10 +198,21 @@ impl ParticleBlock for GraphBlock<'_> {
     #[inline(always)]
     fn pull_to_roots<W: Wide>(&mut self) {
         let particles = self.particles.as_flattened_mut().iter_mut();
-        for (particle, tethers) in particles.zip(self.tethers.chunks_exact(self.tether_count)) {
-            for tether in tethers.iter().filter(|tether| tether.length < f32::INFINITY) {
-                pull_to_root(particle, tether);
+        let (tethers, count) = (self.tethers.chunks_exact(self.tether_count), self.tether_count);
+        if self.tether_pulls.is_empty() {
+            for (particle, tethers) in particles.zip(tethers) {
+                pull_to_roots(particle, tethers, |_, _| {});
             }
+            return;
+        }
+        let pulls = self.tether_pulls.chunks_exact_mut(count);
+        for (particle, (tethers, pulls)) in particles.zip(tethers.zip(pulls)) {
+            let mass = 1.0 / particle.0[3];
+            pull_to_roots(particle, tethers, |slot, excess| {
+                for (sum, excess) in pulls[slot].iter_mut().zip(excess) {
+                    *sum += mass * excess;
+                }
+            });
         }
     }
 
@@ -188,17 +228,28 @@ impl ParticleBlock for GraphBlock<'_> {
     }
 }
 
+/// Shortens d to each tether. Passes the displacement that a tether has taken to `note`.
 #[inline(always)]
-fn pull_to_root(particle: &mut PackedParticle, tether: &PackedTether) {
-    let PackedParticle([x, y, z, w, dx, dy, dz, _]) = *particle;
-    let [root_x, root_y, root_z] = tether.root;
-    let excess = tether_excess(Tethered {
-        start: [x - root_x, y - root_y, z - root_z],
-        displacement: [dx, dy, dz],
-        limit: RestLength::new(tether.length),
-        inverse_mass: w,
-    });
-    for (number, excess) in particle.0[4..7].iter_mut().zip(excess.unwrap_or([0.0; 3])) {
-        *number -= excess;
+fn pull_to_roots(
+    particle: &mut PackedParticle,
+    tethers: &[PackedTether],
+    mut note: impl FnMut(usize, [f32; 3]),
+) {
+    let is_attached = |(_, tether): &(_, &PackedTether)| tether.length < f32::INFINITY;
+    for (slot, tether) in tethers.iter().enumerate().filter(is_attached) {
+        let PackedParticle([x, y, z, w, dx, dy, dz, _]) = *particle;
+        let [root_x, root_y, root_z] = tether.root;
+        let excess = tether_excess(Tethered {
+            start: [x - root_x, y - root_y, z - root_z],
+            displacement: [dx, dy, dz],
+            limit: RestLength::new(tether.length),
+            inverse_mass: w,
+        });
+        for (number, excess) in particle.0[4..7].iter_mut().zip(excess.unwrap_or([0.0; 3])) {
+            *number -= excess;
+        }
+        if let Some(excess) = excess {
+            note(slot, excess);
+        }
     }
 }

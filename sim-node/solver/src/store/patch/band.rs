@@ -6,6 +6,7 @@
 //! stay in a near cache. Every constraint finds its ends as it would stage by stage, so the bits are
 //! the same.
 
+use super::band_forces::BandForces;
 use super::bends::project_bends;
 use super::ends::{ColumnUnit, Ends, project_across, project_down};
 use super::row::SheetRow;
@@ -22,6 +23,7 @@ use crate::step::particle_stages::run_stage;
 use crate::step::schedule::ScheduledStage;
 use crate::step::stage::Stage;
 use crate::step::substep::SubstepInputs;
+use crate::store::pulls::Numbers;
 use crate::store::workers::WorkerScratch;
 
 /// Largest number of stages in a pass: two halves of six families, projected and limited, ten groups of
@@ -34,6 +36,7 @@ pub(crate) struct Band<'a> {
     /// Index of the first row.
     pub(crate) first: usize,
     pub(crate) layout: &'a RowLayout,
+    pub(crate) forces: BandForces<'a>,
 }
 
 /// A pass over some rows.
@@ -45,24 +48,41 @@ pub(crate) struct PassSweep<'a, 'b> {
 }
 
 /// Takes a span of a band through a pass. The output is true if any constraint was marked as torn.
-pub(crate) struct SweepWork<'a, 'b, 'c> {
+///
+/// It is compiled with the measurement of forces and without, which therefore costs nothing.
+pub(crate) struct SweepWork<'a, 'b, 'c, const IS_MEASURED: bool> {
     pub(crate) band: Band<'a>,
     pub(crate) span: Span,
     pub(crate) sweep: PassSweep<'b, 'c>,
 }
 
-impl LaneWork for SweepWork<'_, '_, '_> {
+impl<const IS_MEASURED: bool> LaneWork for SweepWork<'_, '_, '_, IS_MEASURED> {
     type Output = bool;
 
     #[inline(always)]
     fn run<W: Wide>(mut self) -> bool {
-        self.band.sweep::<W>(&self.span, &mut self.sweep)
+        self.band.sweep::<W, IS_MEASURED>(&self.span, &mut self.sweep)
+    }
+}
+
+impl<'a> Band<'a> {
+    /// Splits before a row.
+    pub(crate) fn split_at(self, row: usize) -> (Band<'a>, Band<'a>) {
+        let Self { numbers, first, layout, forces } = self;
+        let (numbers, others) = numbers.split_at_mut((row - first) * layout.row_length);
+        let (forces, other_forces) = forces.split_at(row);
+        let other = Band { numbers: others, first: row, layout, forces: other_forces };
+        (Band { numbers, first, layout, forces }, other)
     }
 }
 
 impl Band<'_> {
     #[inline(always)]
-    fn sweep<W: Wide>(&mut self, span: &Span, sweep: &mut PassSweep<'_, '_>) -> bool {
+    fn sweep<W: Wide, const IS_MEASURED: bool>(
+        &mut self,
+        span: &Span,
+        sweep: &mut PassSweep<'_, '_>,
+    ) -> bool {
         let stages = sweep.stages;
         let mut span = span.clone();
         let mut rows = [const { 0..0 }; STAGES_MAX];
@@ -82,7 +102,7 @@ impl Band<'_> {
                 // Above the first row it wraps to an index that no range contains.
                 let row = front.wrapping_sub(stage.lag);
                 if rows.contains(&row) {
-                    is_marked |= self.run_stage::<W>(stage, row, sweep);
+                    is_marked |= self.run_stage::<W, IS_MEASURED>(stage, row, sweep);
                 }
             }
         }
@@ -90,7 +110,7 @@ impl Band<'_> {
     }
 
     #[inline(always)]
-    fn run_stage<W: Wide>(
+    fn run_stage<W: Wide, const IS_MEASURED: bool>(
         &mut self,
         scheduled: &ScheduledStage,
         row: usize,
@@ -98,19 +118,57 @@ impl Band<'_> {
     ) -> bool {
         match scheduled.stage {
             Stage::Project | Stage::LimitStretch => {
-                return self.project::<W>(scheduled, row, sweep);
+                let has_pulls = IS_MEASURED && self.forces.has_pulls(row, scheduled.group);
+                if has_pulls {
+                    self.note_pulls(row, scheduled.group);
+                }
+                let is_marked = self.project::<W>(scheduled, row, sweep);
+                if has_pulls {
+                    self.add_pulls(row, scheduled.group);
+                }
+                return is_marked;
             }
             Stage::Bend => {
+                let group = 2 * self.layout.families.len() + scheduled.group;
+                let has_pulls = IS_MEASURED && self.forces.has_pulls(row, group);
+                if has_pulls {
+                    self.note_pulls(row, group);
+                }
                 self.bend::<W>(scheduled, row, sweep);
+                if has_pulls {
+                    self.add_pulls(row, group);
+                }
                 return false;
             }
             _ => {}
         }
         let (layout, length) = (self.layout, self.layout.row_length);
         let numbers = &mut self.numbers[(row - self.first) * length..][..length];
-        let mut row = SheetRow::new(numbers, layout, row);
-        run_stage::<W>(scheduled.stage, &mut row, sweep.inputs, &mut sweep.scratch.contacts);
+        let (reactions, tether_pulls): (&mut [_], &mut [_]) =
+            if IS_MEASURED { self.forces.of_row(row) } else { (&mut [], &mut []) };
+        let mut row = SheetRow::new(numbers, layout, row, tether_pulls);
+        let contacts = &mut sweep.scratch.contacts;
+        run_stage::<W>(scheduled.stage, &mut row, sweep.inputs, contacts, reactions);
         false
+    }
+
+    /// Notes the displacements before the projection of a group of a row. Not inlined: the loops around it would
+    /// become so large that parts of them are no longer inlined.
+    #[inline(never)]
+    fn note_pulls(&mut self, row: usize, group: usize) {
+        let projection = self.forces.projection(row, group);
+        let RowLayout { row_length, stride, .. } = *self.layout;
+        let numbers = Numbers { part: self.numbers, first: self.first * row_length, stride };
+        self.forces.pulls.note(projection, numbers);
+    }
+
+    /// Adds the changes since [`Self::note_pulls`].
+    #[inline(never)]
+    fn add_pulls(&mut self, row: usize, group: usize) {
+        let projection = self.forces.projection(row, group);
+        let RowLayout { row_length, stride, .. } = *self.layout;
+        let numbers = Numbers { part: self.numbers, first: self.first * row_length, stride };
+        self.forces.pulls.add_changes(projection, numbers);
     }
 
     /// Projects the bends of a group that begin in a row.

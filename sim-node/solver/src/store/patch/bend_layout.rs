@@ -69,6 +69,11 @@ impl BendLayout {
 }
 
 impl BendGroup {
+    /// Number of the group in the order of projection of all families.
+    pub(crate) fn number(&self) -> u32 {
+        self.family.group_of(self.part)
+    }
+
     /// True if bends of the group begin in a row.
     pub(crate) fn begins_in(&self, row: usize) -> bool {
         match self.family {

@@ -7,6 +7,7 @@ use crate::constraints::separation::RestLength;
 use crate::constraints::tether_pull::{Tethered, tether_excess};
 use crate::contacts::path::{LanePath, SubstepPath};
 use crate::kernels::lanes::{Lanes8, Wide, axes, lane_groups, lane_groups_mut};
+use crate::kernels::vectors::{divided, masked};
 use crate::step::particle_block::ParticleBlock;
 use crate::step::prediction::Prediction;
 use crate::store::layout::SceneFields;
@@ -21,6 +22,9 @@ pub(crate) struct SheetRow<'a> {
     /// For each tether of a particle: the position of the root at the end of the substep, the largest
     /// distance to it, and its square.
     tethers: &'a [f32],
+    /// For each tether of a particle and each axis: mass times the displacement that the tether has taken in this
+    /// step. Empty if nobody asks for it.
+    tether_pulls: &'a mut [Lanes8],
     /// Length of a field in numbers.
     stride: usize,
     /// Index of the first particle.
@@ -29,24 +33,44 @@ pub(crate) struct SheetRow<'a> {
 
 impl<'a> SheetRow<'a> {
     #[inline(always)]
-    pub(crate) fn new(numbers: &'a mut [f32], layout: &RowLayout, row: usize) -> Self {
-        let count = layout.columns.div_ceil(8);
-        let mut rest = numbers;
-        let mut next = || {
-            let (field, others) = std::mem::take(&mut rest).split_at_mut(layout.stride);
-            rest = others;
-            lane_groups_mut(field, 0, count)
-        };
+    pub(crate) fn new(
+        numbers: &'a mut [f32],
+        layout: &RowLayout,
+        row: usize,
+        tether_pulls: &'a mut [Lanes8],
+    ) -> Self {
+        let (stride, count) = (layout.stride, layout.columns.div_ceil(8));
+        let mut numbers = numbers;
+        let rest = &mut numbers;
         let SceneFields { colliders, wind, tethers, .. } = layout.fields.scene;
-        let x = [next(), next(), next()];
-        let (w, d) = (&*next(), [next(), next(), next()]);
-        let predicted = colliders.then(|| [next(), next(), next()]);
-        let wind = wind.then(|| [&*next(), &*next(), &*next()]);
+        let x = next_vector(rest, stride, count);
+        let w = &*next_field(rest, stride, count);
+        let d = next_vector(rest, stride, count);
+        let predicted = if colliders { Some(next_vector(rest, stride, count)) } else { None };
+        let wind = if wind { Some(next_vector(rest, stride, count)) } else { None };
+        let wind = wind.map(|[x, y, z]| [&*x, &*y, &*z]);
         let wind = wind.filter(|_| layout.fields.is_wind_used);
-        let (tethers, stride) = (&rest[..TETHER_FIELDS * tethers * layout.stride], layout.stride);
+        let tethers = &numbers[..TETHER_FIELDS * tethers * stride];
         let first = layout.first + row * layout.columns;
-        Self { x, w, d, predicted, wind, tethers, stride, first }
+        Self { x, w, d, predicted, wind, tethers, tether_pulls, stride, first }
     }
+}
+
+/// Splits a field off the numbers of a row. (As a closure it would compile to a call.)
+#[inline(always)]
+#[allow(clippy::mut_mut, reason = "it shortens the slice")]
+fn next_field<'a>(rest: &mut &'a mut [f32], stride: usize, count: usize) -> &'a mut [Lanes8] {
+    let (field, others) = std::mem::take(rest).split_at_mut(stride);
+    *rest = others;
+    lane_groups_mut(field, 0, count)
+}
+
+#[inline(always)]
+#[allow(clippy::mut_mut, reason = "it shortens the slice")]
+fn next_vector<'a>(rest: &mut &'a mut [f32], stride: usize, count: usize) -> [&'a mut [Lanes8]; 3] {
+    let x = next_field(rest, stride, count);
+    let y = next_field(rest, stride, count);
+    [x, y, next_field(rest, stride, count)]
 }
 
 impl SheetRow<'_> {
@@ -81,6 +105,17 @@ fn vector(axes: &[&mut [Lanes8]; 3], index: usize) -> Vec3 {
 fn set_vector(axes: &mut [&mut [Lanes8]; 3], index: usize, vector: Vec3) {
     for (axis, number) in axes.iter_mut().zip(vector.to_array()) {
         axis[index / 8][index % 8] = number;
+    }
+}
+
+/// Adds the momentum that a tether has taken from eight particles to its sums, which are `stride` apart.
+#[inline(always)]
+fn add_pull<W: Wide>(sums: &mut [Lanes8], stride: usize, excess: [W; 3], inverse_mass: W) {
+    let is_free = W::splat(0.0).is_below(inverse_mass);
+    let pull = masked(divided(excess, inverse_mass), is_free);
+    for (axis, pull) in pull.into_iter().enumerate() {
+        let sum = &mut sums[axis * stride];
+        (W::load(sum, 0) + pull).store(sum, 0);
     }
 }
 
@@ -157,7 +192,8 @@ impl ParticleBlock for SheetRow<'_> {
     #[inline(always)]
     fn pull_to_roots<W: Wide>(&mut self) {
         let count = self.w.len();
-        for tether in self.tethers.chunks_exact(TETHER_FIELDS * self.stride) {
+        let tethers = self.tethers.chunks_exact(TETHER_FIELDS * self.stride);
+        for (slot, tether) in tethers.enumerate() {
             let field = |index: usize| lane_groups(tether, index * self.stride, count);
             let root = [field(0), field(1), field(2)];
             let (length, square) = (field(3), field(4));
@@ -174,6 +210,10 @@ impl ParticleBlock for SheetRow<'_> {
                 let Some(excess) = excess else { continue };
                 for axis in 0..3 {
                     (before[axis] - excess[axis]).store(&mut self.d[axis][group], 0);
+                }
+                if !self.tether_pulls.is_empty() {
+                    let first = 3 * slot * count + group;
+                    add_pull(&mut self.tether_pulls[first..], count, excess, load(self.w));
                 }
             }
         }

@@ -97,6 +97,11 @@ impl RowLayout {
         self.wind_at() + 3 * usize::from(self.fields.scene.wind) + TETHER_FIELDS * slot
     }
 
+    /// Number of groups of constraints and bends that a row is projected in.
+    pub(crate) fn pull_groups(&self) -> usize {
+        2 * self.families.len() + self.bends.groups.len()
+    }
+
     /// Number of bands into which the sheet is divided, each high enough that its seams are a small
     /// part of it.
     pub(crate) fn band_count(&self, workers: usize, reach: usize) -> usize {

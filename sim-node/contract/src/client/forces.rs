@@ -1,0 +1,57 @@
+//! The forces that a client reads: the newest ones, or those of a snapshot.
+
+use crate::client::views::Forces;
+use crate::messages::forces::{ForceRow, ForcesHeader};
+use crate::messages::snapshot::SnapshotHeader;
+use crate::ports::reader::{ReadError, SliceReader, SliceSample};
+use crate::ports::service::{FORCES, ServiceError};
+use crate::ports::services::Services;
+
+/// A reader that keeps the message that it read last.
+#[derive(Debug)]
+pub(crate) struct ForcesReader {
+    reader: SliceReader<ForceRow, ForcesHeader>,
+    kept: Option<SliceSample<ForceRow, ForcesHeader>>,
+}
+
+/// Forces of a step that have arrived, or will not come.
+#[derive(Debug)]
+pub(crate) enum Search {
+    Found(Forces),
+    /// Those of a later step have arrived.
+    Passed,
+}
+
+impl ForcesReader {
+    pub(crate) fn create(services: &Services) -> Result<Self, ServiceError> {
+        Ok(Self { reader: SliceReader::create(&services.forces, &FORCES)?, kept: None })
+    }
+
+    /// Reads all messages, and returns the last one.
+    pub(crate) fn newest(&mut self) -> Result<Option<Forces>, ReadError> {
+        self.reader.replace_by_newest(&mut self.kept)?;
+        Ok(self.kept.as_ref().map(to_forces))
+    }
+
+    /// Reads messages up to that of a step. `None` if it has not arrived yet.
+    pub(crate) fn of_step(&mut self, wanted: &SnapshotHeader) -> Result<Option<Search>, ReadError> {
+        loop {
+            if let Some(kept) = &self.kept
+                && kept.user_header().run_id == wanted.run_id
+                && kept.user_header().step >= wanted.step
+            {
+                let is_found = kept.user_header().step == wanted.step;
+                let found = is_found.then(|| Search::Found(to_forces(kept)));
+                return Ok(Some(found.unwrap_or(Search::Passed)));
+            }
+            match self.reader.next()? {
+                Some(next) => self.kept = Some(next),
+                None => return Ok(None),
+            }
+        }
+    }
+}
+
+fn to_forces(sample: &SliceSample<ForceRow, ForcesHeader>) -> Forces {
+    Forces { header: *sample.user_header(), rows: sample.payload().to_vec() }
+}

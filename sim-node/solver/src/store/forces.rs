@@ -1,0 +1,183 @@
+//! The measurement of what particles do to colliders and fixed particles.
+
+use glam::DVec3;
+
+use super::graph::Graph;
+use super::graph::forces::Projections;
+use super::pulls::{Pull, Receivers, TetherEnds};
+use super::{Location, ParticleStore, find_sheet};
+use crate::contacts::contact::reaction::Reaction;
+use crate::scene::model::Model;
+use crate::state::particles::Particle;
+
+/// The particles of a constraint or bend, with the coefficients of its gradient.
+struct Link {
+    particles: [u32; 4],
+    coefficients: [f32; 4],
+    place: LinkPlace,
+}
+
+/// The part of the store that projects a constraint or bend, and the number of the projection there.
+#[derive(Clone, Copy)]
+struct LinkPlace {
+    /// None for the graph.
+    sheet: Option<usize>,
+    projection: usize,
+}
+
+impl ParticleStore {
+    /// Measures forces in each further step. Call it again when other particles are fixed, or when particles,
+    /// constraints or tethers have moved.
+    pub(crate) fn measure_forces(
+        &mut self,
+        model: &Model,
+        states: &[Particle],
+        receivers: &Receivers<'_>,
+        tethers: impl Iterator<Item = TetherEnds>,
+    ) {
+        let projections = self.graph.projections();
+        let mut in_graph = Vec::new();
+        let mut in_sheets = vec![Vec::new(); self.patches.len()];
+        for link in self.links(model, &projections) {
+            let pulls = match link.place.sheet {
+                None => &mut in_graph,
+                Some(sheet) => &mut in_sheets[sheet],
+            };
+            self.push_pulls(&link, states, receivers, pulls);
+        }
+        self.graph.measure_forces(in_graph, projections, receivers.collider_count);
+        for (patch, pulls) in self.patches.iter_mut().zip(in_sheets) {
+            patch.measure_forces(pulls, receivers.collider_count);
+        }
+        for TetherEnds { particle, slot, root } in tethers {
+            let Some(receiver) = receivers.of_particles[root as usize] else { continue };
+            if let Some(found) = find_sheet(&self.sheets, particle) {
+                self.patches[found.sheet].set_tether_receiver(found.place, slot, receiver);
+            } else {
+                let index = self.location(particle).index();
+                self.graph.set_tether_receiver(index, slot, receiver);
+            }
+        }
+    }
+
+    /// Measures no forces any longer.
+    pub(crate) fn forget_forces(&mut self) {
+        self.graph.forget_forces();
+        for patch in &mut self.patches {
+            patch.forget_forces();
+        }
+    }
+
+    /// Forgets the forces of the last step.
+    pub(crate) fn clear_forces(&mut self) {
+        self.graph.forces_mut().clear();
+        for patch in &mut self.patches {
+            patch.forces_mut().clear();
+        }
+    }
+
+    /// Moves the reactions of a substep to those of the colliders, in the order of the particles' blocks.
+    pub(crate) fn take_reactions(&mut self, totals: &mut [Reaction]) {
+        let sheets = self.patches.iter_mut().map(|patch| &mut patch.forces_mut().reactions);
+        let (parts, count) = (
+            std::iter::once(&mut self.graph.forces_mut().reactions).chain(sheets),
+            totals.len().max(1),
+        );
+        for block in parts.flat_map(|part| part.chunks_exact_mut(count)) {
+            let pairs = totals.iter_mut().zip(block);
+            for (total, reaction) in pairs.filter(|(_, reaction)| reaction.contacts > 0) {
+                total.add_all(&std::mem::take(reaction));
+            }
+        }
+    }
+
+    /// Adds the impulses, times the length of a substep, to those of the fixed particles.
+    pub(crate) fn add_pulls(&self, impulses: &mut [DVec3]) {
+        self.graph.add_pulls(impulses);
+        for patch in &self.patches {
+            patch.add_pulls(impulses);
+        }
+    }
+
+    /// The constraints and bends of a scene.
+    fn links<'a>(
+        &'a self,
+        model: &'a Model,
+        projections: &'a Projections,
+    ) -> impl Iterator<Item = Link> + 'a {
+        let constraints = (0_u32..).zip(&model.families).map(|(constraint, family)| {
+            let [a, b] = model.pair(constraint);
+            let location = self.locations[constraint as usize];
+            Link {
+                particles: [a, b, a, a],
+                coefficients: [1.0, -1.0, 0.0, 0.0],
+                place: self.place_of(location, a, |sheet, row| match sheet {
+                    None => self.graph.projection_of_constraint(projections, location.index()),
+                    Some(sheet) => self.patches[sheet].projection_of_constraint(*family, row),
+                }),
+            }
+        });
+        let bends = (0..).zip(&model.bends).zip(&model.bend_families);
+        let bends = bends.map(|((index, bend), family): ((usize, _), _)| {
+            let location = self.bends.locations[index];
+            Link {
+                particles: bend.particles,
+                coefficients: bend.coefficients,
+                place: self.place_of(location, bend.particles[0], |sheet, row| match sheet {
+                    None => self.graph.projection_of_bend(projections, location.index()),
+                    Some(sheet) => self.patches[sheet].projection_of_bend(*family, row),
+                }),
+            }
+        });
+        constraints.chain(bends)
+    }
+
+    fn place_of(
+        &self,
+        location: Location,
+        first_particle: u32,
+        projection: impl Fn(Option<usize>, usize) -> usize,
+    ) -> LinkPlace {
+        let sheet = location.sheet();
+        let row = match sheet {
+            None => 0,
+            Some(_) => find_sheet(&self.sheets, first_particle).map_or(0, |found| found.place[0]),
+        };
+        LinkPlace { sheet, projection: projection(sheet, row) }
+    }
+
+    /// Pushes a pull for each fixed particle of a constraint or bend.
+    fn push_pulls(
+        &self,
+        link: &Link,
+        states: &[Particle],
+        receivers: &Receivers<'_>,
+        pulls: &mut Vec<Pull>,
+    ) {
+        let ends = || {
+            let all = link.particles.iter().zip(link.coefficients);
+            all.filter(|(_, coefficient)| *coefficient != 0.0)
+        };
+        let inverse_mass = |particle: u32| states[particle as usize].inverse_mass;
+        let Some((free, share)) = ends().find(|(one, _)| inverse_mass(**one) > 0.0) else { return };
+        let fixed = ends().filter_map(|(particle, coefficient)| {
+            Some((receivers.of_particles[*particle as usize]?, coefficient))
+        });
+        for (receiver, coefficient) in fixed {
+            pulls.push(Pull {
+                projection: link.place.projection,
+                at: self.displacement_place(*free),
+                receiver: receiver as usize,
+                factor: coefficient / share / inverse_mass(*free),
+            });
+        }
+    }
+
+    /// Where the x displacement of a particle is among the numbers of the graph or its sheet.
+    fn displacement_place(&self, particle: u32) -> usize {
+        match find_sheet(&self.sheets, particle) {
+            Some(found) => self.patches[found.sheet].displacement_place(found.place),
+            None => Graph::displacement_place(self.location(particle).index()),
+        }
+    }
+}

@@ -1,0 +1,123 @@
+//! Forces of the particles of some rows on colliders and fixed particles.
+
+use super::row_layout::RowLayout;
+use crate::contacts::contact::reaction::Reaction;
+use crate::kernels::lanes::Lanes8;
+use crate::store::pulls::{Pulls, PullsPart};
+
+/// The forces of a sheet. Empty while nobody asks for them.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct SheetForces {
+    pub(crate) pulls: Pulls,
+    /// By row, then by collider.
+    pub(crate) reactions: Vec<Reaction>,
+    /// Number of reactions of a row.
+    reaction_count: usize,
+    /// By row, tether and axis: mass times the displacement that the tether of each particle has taken.
+    pub(crate) tether_pulls: Vec<Lanes8>,
+    /// Number of tether pulls of a row.
+    tether_length: usize,
+    /// By row, tether and column, padding included: index of the root among the fixed particles.
+    pub(crate) tether_receivers: Vec<Option<u32>>,
+}
+
+impl SheetForces {
+    /// Makes room for a sheet, without tethers.
+    pub(crate) fn new(pulls: Pulls, layout: &RowLayout, collider_count: usize) -> Self {
+        let groups = layout.rows * layout.fields.scene.tethers * layout.columns.div_ceil(8);
+        Self {
+            pulls,
+            reactions: vec![Reaction::default(); layout.rows * collider_count],
+            reaction_count: collider_count,
+            tether_pulls: vec![[0.0; 8]; 3 * groups],
+            tether_length: 3 * groups / layout.rows,
+            tether_receivers: vec![None; 8 * groups],
+        }
+    }
+
+    /// Returns true if somebody asks for forces.
+    pub(crate) fn is_measured(&self) -> bool {
+        self.pulls.is_measured()
+    }
+
+    /// Forgets the last step.
+    pub(crate) fn clear(&mut self) {
+        self.pulls.clear();
+        self.tether_pulls.fill([0.0; 8]);
+    }
+
+    /// All rows.
+    pub(crate) fn all(&mut self, layout: &RowLayout) -> BandForces<'_> {
+        let Self { pulls, reactions, reaction_count, tether_pulls, tether_length, .. } = self;
+        BandForces {
+            first: 0,
+            pull_groups: layout.pull_groups(),
+            reaction_count: *reaction_count,
+            tether_length: *tether_length,
+            pulls: pulls.whole(),
+            reactions,
+            tether_pulls,
+        }
+    }
+}
+
+/// The forces of consecutive rows.
+#[derive(Debug)]
+pub(crate) struct BandForces<'a> {
+    /// Index of the first row.
+    first: usize,
+    /// Number of projections in a row.
+    pull_groups: usize,
+    /// Number of reactions of a row.
+    reaction_count: usize,
+    /// Number of tether pulls of a row.
+    tether_length: usize,
+    pub(crate) pulls: PullsPart<'a>,
+    reactions: &'a mut [Reaction],
+    tether_pulls: &'a mut [Lanes8],
+}
+
+impl<'a> BandForces<'a> {
+    /// Splits before a row.
+    pub(crate) fn split_at(self, row: usize) -> (BandForces<'a>, BandForces<'a>) {
+        let Self { first, pull_groups, reaction_count, tether_length, .. } = self;
+        let count = row - first;
+        let (pulls, other_pulls) = self.pulls.split_at(row * pull_groups);
+        let (reactions, other_reactions) = self.reactions.split_at_mut(count * reaction_count);
+        let (tether_pulls, other_tether_pulls) =
+            self.tether_pulls.split_at_mut(count * tether_length);
+        let part = |first, pulls, reactions, tether_pulls| BandForces {
+            first,
+            pull_groups,
+            reaction_count,
+            tether_length,
+            pulls,
+            reactions,
+            tether_pulls,
+        };
+        let before = part(first, pulls, reactions, tether_pulls);
+        (before, part(row, other_pulls, other_reactions, other_tether_pulls))
+    }
+
+    /// Number of a projection: group `group` of a row.
+    #[inline(always)]
+    pub(crate) fn projection(&self, row: usize, group: usize) -> usize {
+        row * self.pull_groups + group
+    }
+
+    /// Returns true if the projection of a group of a row has pulls.
+    #[inline(always)]
+    pub(crate) fn has_pulls(&self, row: usize, group: usize) -> bool {
+        self.pulls.has(self.projection(row, group))
+    }
+
+    /// The reactions and the tether pulls of a row.
+    #[inline(always)]
+    pub(crate) fn of_row(&mut self, row: usize) -> (&mut [Reaction], &mut [Lanes8]) {
+        let row = row - self.first;
+        (
+            &mut self.reactions[row * self.reaction_count..][..self.reaction_count],
+            &mut self.tether_pulls[row * self.tether_length..][..self.tether_length],
+        )
+    }
+}

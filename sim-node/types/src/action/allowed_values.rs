@@ -1,0 +1,138 @@
+//! The allowed values of parameters and commands, in words for error messages.
+
+use crate::action::Action;
+use crate::limits::STEP_WORK_MAX;
+use crate::parameter::{OffMeaning, PARAMETERS, Parameter, ParameterInfo, ValueForm};
+use crate::reason::Reason;
+
+impl ParameterInfo {
+    /// Returns the allowed values in words.
+    pub fn allowed_values(&self) -> String {
+        let values = match self.form {
+            ValueForm::Vector => format!("three numbers, each {}, z 0 in 2-D", self.range.text),
+            ValueForm::Number | ValueForm::Whole => self.range.text.to_owned(),
+        };
+        let off = match self.off {
+            OffMeaning::Zero => ", or off for 0",
+            OffMeaning::NoLimit => ", or off for no limit",
+            OffMeaning::Absent => ", or off for none",
+            OffMeaning::NotAllowed | OffMeaning::OwnOfEach => "",
+        };
+        let kind = if self.is_per_kind { ", for one kind or all" } else { "" };
+        format!("{values}{off}{kind}")
+    }
+}
+
+impl Action {
+    /// Returns the values that this action may have, in words, if it was rejected for its values alone.
+    pub fn allowed_values(&self, reason: Reason) -> Option<String> {
+        match reason {
+            Reason::OutOfRange => self.allowed_ranges(),
+            Reason::NonFinite if self.has_no_limit() => {
+                Some("finite numbers, or off for no limit".to_owned())
+            }
+            Reason::NonFinite => Some("finite numbers".to_owned()),
+            Reason::UnknownParameter => Some(PARAMETERS.map(|info| info.name).join(", ")),
+            _ => None,
+        }
+    }
+
+    /// Returns `true` if the parameter of this action can be without a limit, which scenes write as `inf`.
+    fn has_no_limit(&self) -> bool {
+        let Self::Set { parameter, .. } = self else { return false };
+        Parameter::from_name(parameter.as_str())
+            .is_some_and(|parameter| parameter.info().off == OffMeaning::NoLimit)
+    }
+
+    fn allowed_ranges(&self) -> Option<String> {
+        let values = match self {
+            Self::Set { parameter, constraint_kind, .. } => {
+                let info = Parameter::from_name(parameter.as_str())?.info();
+                let has_kind = constraint_kind.is_some() && !info.is_per_kind;
+                let kind = if has_kind { ", no kind" } else { "" };
+                return Some(format!("{}{}{kind}", info.allowed_values(), work(info.parameter)));
+            }
+            Self::Grab { .. } | Self::Move { .. } => {
+                "coordinates within 1e7, z 0 in 2-D, over 0 to 0.25 s"
+            }
+            Self::Push { .. } => {
+                "coordinates and delta within 1e7, z 0 in 2-D, radius 0 to 1e7, limit 0 or more"
+            }
+            Self::CutRadius { .. } => "coordinates within 1e7, z 0 in 2-D, radius 0 to 1e7",
+            Self::CutSegment { .. } => {
+                "coordinates within 1e7, direction not 0; in 2-D, z of both ends 0"
+            }
+            Self::MoveAnchor { .. } => {
+                "coordinates within 1e7, rotation not 0; in 2-D, z 0 and a rotation about z"
+            }
+            Self::MoveCollider { .. } => {
+                "coordinates within 1e7, rotation not 0; in 2-D, z 0 and a rotation about z; for \
+                 bounds, no rotation"
+            }
+            Self::Load { .. } => "a scene that the node can read; see its messages",
+            Self::Step { .. } => "1 or more",
+            Self::Mark { .. } => "a text that is not empty",
+            Self::Rewind { .. } => "a step of this run that the node has made",
+            _ => return None,
+        };
+        Some(values.to_owned())
+    }
+}
+
+/// The limit on the work of a step, for the parameters that it depends on.
+fn work(parameter: Parameter) -> String {
+    match parameter {
+        Parameter::Substeps | Parameter::Iterations => format!(
+            ", with substeps x (constraints x iterations + particles x (colliders + 1)) at most \
+             {STEP_WORK_MAX}"
+        ),
+        _ => String::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{ConstraintKind, KindFilter, ParameterValue, Text};
+
+    #[test]
+    fn the_allowed_values_name_range_off_and_kind() {
+        let text = |parameter: Parameter| parameter.info().allowed_values();
+        assert_eq!(text(Parameter::Substeps), "a whole number from 1 to 1000");
+        assert_eq!(text(Parameter::TearForce), "a number > 0, or off for no limit");
+        assert_eq!(text(Parameter::Stiffness), "0 to 1, for one kind or all");
+        let gravity = "three numbers, each -1e7 to 1e7, z 0 in 2-D, or off for 0";
+        assert_eq!(text(Parameter::Gravity), gravity);
+    }
+
+    #[test]
+    fn a_kind_for_a_parameter_without_kinds_is_named() {
+        let action = Action::Set {
+            parameter: Text::cut("damping"),
+            value: ParameterValue::Number(1.0),
+            constraint_kind: Some(KindFilter::Known(ConstraintKind::Bend)),
+        };
+        let values = action.allowed_values(Reason::OutOfRange).unwrap();
+        assert_eq!(values, "a number >= 0, or off for 0, no kind");
+    }
+
+    #[test]
+    fn every_action_that_can_be_out_of_range_names_its_values() {
+        for action in Action::samples() {
+            let is_checked = !matches!(
+                action,
+                Action::Pin { .. }
+                    | Action::Unpin { .. }
+                    | Action::Release { .. }
+                    | Action::Pause
+                    | Action::Resume
+                    | Action::Reset
+                    | Action::Cut { .. }
+                    | Action::Restore { .. }
+                    | Action::Unknown { .. }
+            );
+            let values = action.allowed_values(Reason::OutOfRange);
+            assert_eq!(values.is_some(), is_checked, "{action:?}");
+        }
+    }
+}
