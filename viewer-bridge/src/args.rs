@@ -10,7 +10,7 @@ use clap::{CommandFactory, Parser};
 use sim_cli::DocumentVerb;
 use sim_contract::{Endpoint, EndpointError, NAME_DEFAULT};
 use viewer_bridge::source::replay::InitialPlayback;
-use viewer_bridge::{FoxgloveOptions, FoxglovePermission, RecordingTimes};
+use viewer_bridge::{FoxgloveOptions, FoxglovePermission, RecordingTimes, TokenDemand};
 
 /// Show a running simulation in a browser, and interact with it there.
 ///
@@ -31,6 +31,7 @@ use viewer_bridge::{FoxgloveOptions, FoxglovePermission, RecordingTimes};
         viewer-bridge --name left --domain lab      show another node\n  \
         viewer-bridge --replay run.mcap             show a recording; needs no node\n  \
         viewer-bridge --listen 0.0.0.0:8080         serve other machines; the address has a token\n  \
+        viewer-bridge --token                       keep other users of this machine out\n  \
         viewer-bridge --foxglove                    also serve Foxglove viewers at ws://127.0.0.1:8765\n  \
         viewer-bridge --foxglove --allow-commands   let them pause, step, reset and set as well\n  \
         viewer-bridge --foxglove --replay run.mcap --play   show them a recording, again and again"
@@ -51,6 +52,10 @@ pub(crate) struct Args {
     /// repeated
     #[arg(long = "host", value_name = "HOST", value_parser = host_name)]
     pub(crate) hosts: Vec<String>,
+    /// Require the token in the printed address on loopback too, so that other users of this machine
+    /// cannot command the node
+    #[arg(long)]
+    token: bool,
     /// Recording to show instead of a node, written by `recorder record` or `recorder simulate`; an
     /// incomplete file is shown as far as it goes
     #[arg(long, value_name = "FILE.mcap", conflicts_with_all = ["name", "domain"])]
@@ -99,6 +104,11 @@ pub(crate) fn parse(
 impl Args {
     pub(crate) fn endpoint(&self) -> Result<Endpoint, EndpointError> {
         Endpoint::from_options(self.domain.as_deref(), Some(&self.name))
+    }
+
+    /// The servers whose pages need a token.
+    pub(crate) fn token_demand(&self) -> TokenDemand {
+        if self.token { TokenDemand::Always } else { TokenDemand::BeyondLoopback }
     }
 
     /// Playback of the recording before the first request.

@@ -37,5 +37,6 @@ pub use pages::server::{Server, ServerOptions};
 pub use shutdown::Shutdown;
 pub use sink::Sinks;
 pub use socket::descriptors::open_files_warning;
+pub use socket::guard::TokenDemand;
 pub use source::Source;
 pub use source::recording_times::RecordingTimes;

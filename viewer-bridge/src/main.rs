@@ -65,7 +65,12 @@ fn run(args: &Args) -> anyhow::Result<()> {
         Some(folder) => Assets::folder(folder)
             .with_context(|| format!("reading the page from {}", folder.display()))?,
     };
-    let options = ServerOptions { listen: args.listen, names: args.hosts.clone(), assets };
+    let options = ServerOptions {
+        listen: args.listen,
+        names: args.hosts.clone(),
+        token: args.token_demand(),
+        assets,
+    };
     let runtime = runtime::Builder::new_multi_thread()
         .worker_threads(SERVER_THREADS)
         .enable_all()
@@ -167,7 +172,7 @@ fn announce(server: &Server, foxglove: Option<&FoxgloveServer>) {
         note(&format!("foxglove {}", foxglove.url()));
     }
     note(&format!("ready {url}"));
-    if url.contains('#') {
+    if !server.is_local() {
         note("warning: other machines can connect; anyone with the token can control the node");
     }
 }

@@ -7,7 +7,7 @@ use std::fmt::Debug;
 use std::sync::Arc;
 
 use recorder::{OutcomeRow, StatusRow, StepRow};
-use sim_contract::{ParticleState, TornConstraint};
+use sim_contract::{ConstraintState, LoadHeader, ParticleState, TornConstraint, Triangle};
 
 use crate::message::{Level, Node, OutcomeText, ParametersText, Playback, Timeline};
 use crate::request::ClientId;
@@ -19,6 +19,8 @@ use crate::wire::{Colliders, Pins, Scene, Stamp, Statistics};
 pub enum Update<'a> {
     /// A new load. Nothing of it is torn, held or moved yet.
     Load(&'a Scene),
+    /// The constraints and triangles of the load, as the node publishes them. It follows [`Update::Load`].
+    Topology(Topology<'a>),
     /// The newest load cannot be shown. The previous one stays on show until the next [`Update::Load`].
     LoadRefused {
         /// The reason, for the user.
@@ -67,6 +69,17 @@ pub enum Update<'a> {
         /// The answer.
         outcome: &'a OutcomeText,
     },
+}
+
+/// The constraints and triangles of a load.
+#[derive(Debug, Clone, Copy)]
+pub struct Topology<'a> {
+    /// Header of the load.
+    pub header: &'a LoadHeader,
+    /// Constraints in the order of their indices.
+    pub constraints: &'a [ConstraintState],
+    /// Triangles of the surface.
+    pub triangles: &'a [Triangle],
 }
 
 /// The list of torn constraints after a step, in the order of tearing.

@@ -386,7 +386,7 @@ fn to_page_of_a_replay() -> Vec<ToPage> {
 }
 
 /// One message of each kind that a page may send.
-const FROM_PAGE: [&str; 25] = [
+const FROM_PAGE: [&str; 26] = [
     r#"{"type":"hello","protocol":2,"token":"00","format":"u16"}"#,
     r#"{"type":"hello","protocol":2}"#,
     r#"{"type":"ack","frame":77}"#,
@@ -394,6 +394,7 @@ const FROM_PAGE: [&str; 25] = [
     r#"{"type":"move","particle":90,"target":[0.5,0.4,0.3]}"#,
     r#"{"type":"release","particle":90}"#,
     r#"{"type":"brush","eye":[0,0,5],"ray":[0,0,-1],"radius":0.2,"delta":[0.01,0,0],"over_s":0.016,"cap":0.05}"#,
+    r#"{"type":"push","center":[0,1,0],"radius":0.3,"delta":[0,0,0.02],"limit":0.05}"#,
     r#"{"type":"pin","particle":3}"#,
     r#"{"type":"unpin","particle":3}"#,
     r#"{"type":"cut","epoch":3,"constraints":[1,2,3],"id":2}"#,

@@ -8,6 +8,8 @@
     reason = "a panic is how a test fails"
 )]
 
+mod access;
+mod first_minute;
 mod pages;
 mod picture;
 mod pointer;

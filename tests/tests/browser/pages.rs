@@ -25,17 +25,31 @@ fn a_slider_sets_a_parameter_of_the_node() {
 
 #[test]
 #[ignore = "needs Chromium"]
-fn a_link_opens_its_scene_and_view() {
-    let mut rig = Rig::new(&["curtain"], "scene=rope&camera=0,1,0,5,0.25,0.5&show.particles=0");
+fn a_link_asks_before_it_loads_its_scene_and_then_shows_its_view() {
+    let fragment = "scene=rope&camera=0,1,0,5,0.25,0.5&show.particles=0";
+    let mut rig = Rig::new(&["curtain"], fragment);
+    let other = rig.another_tab(fragment);
+    for tab in [&rig.tab, &other] {
+        tab.wait("document.querySelector('#question').checkVisibility()");
+    }
+    other.click("#question-no");
+    other.wait("!document.querySelector('#question').checkVisibility()");
+    // Neither opening the links nor the refusal has changed anything.
+    assert_eq!(rig.state().particles.len(), 168);
+    assert_eq!(rig.tab.evaluate("viewer.unanswered"), 0);
+    rig.tab.click("#question-yes");
     rig.wait_for_state("the rope in the node", |state| state.particles.len() == 41);
     rig.tab.wait("viewer.scene === 'rope' && viewer.frame >= 0 && viewer.camera.distance === 5");
     let view =
         rig.tab.evaluate("[viewer.camera.yaw, viewer.camera.pitch, viewer.toggles.particles]");
     assert_eq!(view, serde_json::json!([0.25, 0.5, false]));
-    // The link that the page creates has the same view.
+    // The link that the page creates has the same view. It asks nothing where its scene is on show.
     rig.tab.click("#link");
     rig.tab.wait("location.hash.includes('camera=0,1,0,5,0.25,0.5')");
     assert_eq!(rig.tab.evaluate("location.hash.includes('scene=rope')"), true);
+    let same = rig.another_tab(fragment);
+    assert_eq!(same.number("viewer.camera.distance"), 5.0);
+    assert_eq!(same.evaluate("document.querySelector('#question').checkVisibility()"), false);
 }
 
 #[test]
@@ -48,10 +62,12 @@ fn two_pages_share_one_simulation() {
     let is_grabbed =
         format!("viewer.pins.some(([one, flags]) => one === {TARGET} && (flags & 2) !== 0)");
     other.wait(&is_grabbed);
-    // The other page cannot grab the same particle, and shows a notice.
-    other.press(at, Button::Left);
+    // The other page cannot grab the same particle, and shows a notice. It frames the moving curtain as it
+    // was when the page opened.
+    let seen = other.camera().project(rig.state().particles[TARGET].position);
+    other.press(seen, Button::Left);
     other.wait("viewer.notices.length > 0");
-    other.release(at);
+    other.release(seen);
     rig.tab.wait(&is_grabbed);
     rig.tab.release(at);
     other.wait(&format!("!{is_grabbed}"));

@@ -1,10 +1,10 @@
 //! Pointer tools: a grab, a cut, a pin and a brush stroke show in the snapshots of the node.
 
-use integration_tests::{DEADLINE, wait_for};
+use integration_tests::{DEADLINE, ctl, wait_for};
 use serde_json::json;
 use sim_contract::{ParticleFlags, ParticleState};
 
-use crate::support::{Area, Button, Rig, State, distance, is_grab_mark};
+use crate::support::{Area, Button, Rig, State, distance, is_cloth, is_grab_mark};
 
 /// Particle of the curtain that the tests grab: row 6, column 6.
 const TARGET: usize = 90;
@@ -97,8 +97,11 @@ fn a_released_particle_keeps_the_velocity_of_the_pointer() {
 #[test]
 #[ignore = "needs Chromium"]
 fn a_stroke_with_the_right_button_cuts_the_sticks_it_crosses() {
-    // The cloth sags at the cut while the stroke continues.
-    let mut rig = Rig::new(&["curtain"], "");
+    // The cloth sags at the cut while the stroke continues. In wind it would also move away before.
+    let mut rig = Rig::new(&["curtain", "--paused"], "");
+    ctl(&rig.sandbox, &["set", "wind_drag", "off"]);
+    rig.tab.key(' ');
+    rig.tab.wait("!viewer.paused");
     let camera = rig.tab.camera();
     let pixel = |state: &State, row: usize, column: usize| {
         camera.project(state.particles[row * COLUMNS + column].position)
@@ -139,6 +142,36 @@ fn a_stroke_with_the_right_button_cuts_the_sticks_it_crosses() {
     rig.wait_for_state("the cut part to sag", |now| {
         now.particles[lowest].position[1] < height - 0.03
     });
+}
+
+#[test]
+#[ignore = "needs Chromium"]
+fn a_cut_is_a_line_in_the_picture_and_not_a_row_of_missing_cells() {
+    let mut rig = Rig::new(&["curtain", "--paused"], "");
+    let state = rig.settled();
+    let camera = rig.tab.camera();
+    let pixel = |particle: usize| camera.project(state.particles[particle].position);
+    let cloth = |rig: &Rig| rig.tab.drawn(camera.area()).count(&camera.area(), is_cloth) as f64;
+    let intact = cloth(&rig);
+    // Along the middle between rows 5 and 6, from outside the left edge to outside the right one.
+    let middle = |column: usize| {
+        let (above, below) = (pixel(5 * COLUMNS + column), pixel(6 * COLUMNS + column));
+        [0, 1].map(|axis| f64::midpoint(above[axis], below[axis]))
+    };
+    let (left, right) = (middle(0), middle(COLUMNS - 1));
+    let (from, to) = ([left[0] - 20.0, left[1]], [right[0] + 20.0, right[1]]);
+    rig.tab.press(from, Button::Right);
+    for at in (0..COLUMNS).map(middle).chain([to]) {
+        rig.tab.move_to(at);
+    }
+    rig.tab.release(to);
+    rig.step(1);
+    let torn = COLUMNS + 2 * (COLUMNS - 1);
+    rig.tab.wait(&format!("viewer.torn === {torn}"));
+    rig.settled();
+    // A row of cells is an eleventh of the curtain.
+    let share = cloth(&rig) / intact;
+    assert!((0.99..1.01).contains(&share), "{share} of the cloth is left");
 }
 
 #[test]

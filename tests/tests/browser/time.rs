@@ -67,6 +67,8 @@ fn the_page_reports_a_lost_node_and_continues_when_it_is_back() {
     let epoch = rig.tab.evaluate("viewer.epoch");
     rig.node.signal(Signal::KILL);
     rig.tab.wait("viewer.node === 'lost' && viewer.banner !== ''");
+    rig.tab.wait("document.querySelector('#hud').textContent.includes('last state')");
+    rig.tab.wait("document.querySelector('#pause').disabled && document.querySelector('#parameters fieldset').disabled");
     assert_eq!(rig.tab.evaluate("document.querySelector('#banner').checkVisibility()"), true);
     // The last picture stays visible.
     let area = rig.tab.camera().area();
@@ -89,6 +91,11 @@ fn the_page_reconnects_to_a_restarted_bridge() {
     rig.tab.wait("viewer.connection !== 'open' && viewer.banner !== ''");
     // The browser logs an error for each failed attempt to connect.
     rig.tab.expect_error("ERR_CONNECTION_REFUSED");
+    // Nothing can be pressed, and the figures of the past are gone.
+    rig.tab.wait("document.querySelector('#hud').textContent.includes('last state')");
+    let enabled = "[...document.querySelectorAll('#pause, #step, #reset, #scene, #modes button, #parameters fieldset, #parameters-reset')].filter(one => !one.disabled).length";
+    assert_eq!(rig.tab.evaluate(enabled), 0);
+    assert_eq!(rig.tab.evaluate("document.querySelector('#figures').textContent"), "");
     let step = rig.state().step;
     rig.restart_bridge();
     rig.tab.wait(&format!(

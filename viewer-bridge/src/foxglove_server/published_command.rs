@@ -41,7 +41,11 @@ pub fn parse(payload: &[u8], epoch: u32) -> Result<Command, String> {
         }
         Action::Load { scene } => Command::Load { scene: scene.as_str().to_owned() },
         Action::Mark { text } => Command::Mark { text: text.as_str().to_owned() },
-        Action::Push { .. } => return Err("push is not accepted here".to_owned()),
+        // No limit and an infinite one are the same.
+        Action::Push { center, radius, delta, limit } => {
+            let limit = limit.filter(|limit| *limit != f32::INFINITY);
+            Command::Push { center, radius, delta, limit }
+        }
         Action::Rewind { .. } => return Err("rewind is not accepted here".to_owned()),
         Action::Restore { .. } => return Err("restore is not accepted here".to_owned()),
         Action::Unknown { .. } => return Err("no such command".to_owned()),
@@ -62,6 +66,15 @@ mod tests {
         let text = r#"{"kind":"grab","particle":1,"target":[0,1,2],"over_s":0.1}"#;
         assert_eq!(read(text), Ok(grab));
         assert_eq!(read(r#"{"kind":"pause"}"#), Ok(Command::Pause {}));
+        let push = Command::Push {
+            center: [0.0, 1.0, 2.0],
+            radius: 0.5,
+            delta: [0.1, 0.0, 0.0],
+            limit: None,
+        };
+        let text = r#"{"kind":"push","center":[0,1,2],"radius":0.5,"delta":[0.1,0,0]"#;
+        assert_eq!(read(&format!("{text}}}")), Ok(push.clone()));
+        assert_eq!(read(&format!(r#"{text},"limit":"inf"}}"#)), Ok(push));
         let mark = Command::Mark { text: "slips".to_owned() };
         assert_eq!(read(r#"{"kind":"mark","text":"slips"}"#), Ok(mark));
     }
@@ -71,8 +84,8 @@ mod tests {
         for text in ["", "[]", "{}", r#"{"kind":"dance"}"#, r#"{"kind":"pin"}"#] {
             assert!(parse(text.as_bytes(), 1).is_err(), "{text}");
         }
-        let push = br#"{"kind":"push","center":[0,0,0],"radius":1,"delta":[0,0,0]}"#;
-        assert_eq!(parse(push, 1), Err("push is not accepted here".to_owned()));
+        let rewind = br#"{"kind":"rewind","to_step":3}"#;
+        assert_eq!(parse(rewind, 1), Err("rewind is not accepted here".to_owned()));
         let release = br#"{"kind":"release","particle":3,"force":true}"#;
         assert_eq!(parse(release, 1), Err("release with force is not accepted here".to_owned()));
     }

@@ -10,19 +10,21 @@ use foxglove::messages::{FrameTransform, PointCloud, SceneUpdate};
 use foxglove::{Context, Encode, FoxgloveError, PartialMetadata, RawChannel, Schema, SinkId};
 use recorder::{
     CollidersRow, DrawnMesh, Message, MessageEncoder, OutcomeRow, RunDescription, SCENE_TOPIC,
-    SceneDrawing, StatusRow, StepRow, TearsRow, Topic, TopicFormat, Up, encode_transform,
-    scene_format,
+    SceneDrawing, StatusRow, StepRow, SurfaceRow, TearsRow, Topic, TopicFormat, TopologyRow, Up,
+    encode_transform, scene_format,
 };
 use sim_contract::ConstraintKind;
 use sim_contract::clock::{SECOND_NS, monotonic_ns, realtime_ns};
 
-use crate::sink::{State, Torn};
+use crate::sink::{State, Topology, Torn};
 use crate::source::recording_times::RecordingTimes;
 use crate::wire::{Colliders, Scene};
 
 /// Topics with the messages of a recording.
-const TOPICS: [Topic; 7] = [
+const TOPICS: [Topic; 9] = [
     Topic::Tf,
+    Topic::Topology,
+    Topic::Surface,
     Topic::Colliders,
     Topic::Tears,
     Topic::Outcomes,
@@ -74,6 +76,8 @@ struct PublisherState {
     /// Number of messages that were encoded on `/particles` and `/scene`.
     encoded_count: u64,
     /// Earlier messages for late subscribers.
+    topology: Option<TopologyRow>,
+    surface: Option<SurfaceRow>,
     colliders: Option<CollidersRow>,
     torn: Option<TearsRow>,
     status: Option<StatusRow>,
@@ -252,10 +256,28 @@ impl Publisher {
             self.settle(Topic::Tf);
         }
         state.load = Some(load);
+        (state.topology, state.surface) = (None, None);
         state.colliders = None;
         state.torn = None;
         state.step = None;
         self.is_scene_due.store(true, Ordering::Relaxed);
+    }
+
+    /// Publishes the constraints and triangles of the load.
+    pub(super) fn publish_topology(&self, topology: &Topology<'_>) {
+        let Topology { header, constraints, triangles } = *topology;
+        let mut state = self.state();
+        let (topology, surface) =
+            (TopologyRow::new(header, constraints), SurfaceRow::new(header, triangles));
+        if self.has_subscribers(Topic::Topology) {
+            self.send(&mut state, &Message::Topology(topology.clone()), None);
+            self.settle(Topic::Topology);
+        }
+        if self.has_subscribers(Topic::Surface) {
+            self.send(&mut state, &Message::Surface(surface.clone()), None);
+            self.settle(Topic::Surface);
+        }
+        (state.topology, state.surface) = (Some(topology), Some(surface));
     }
 
     /// Publishes the poses of the colliders. The next picture has them.
@@ -369,6 +391,8 @@ impl Publisher {
                     }
                     continue;
                 }
+                Topic::Topology => state.topology.clone().map(Message::Topology),
+                Topic::Surface => state.surface.clone().map(Message::Surface),
                 Topic::Colliders => state.colliders.clone().map(Message::Colliders),
                 Topic::Tears => state.torn.clone().map(Message::Tears),
                 Topic::Status => state.status.clone().map(Message::Status),

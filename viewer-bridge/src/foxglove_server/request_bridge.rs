@@ -297,7 +297,8 @@ fn refused_set(reason: Reason) -> OutcomeText {
 
 /// The reason of a refusal for the user.
 fn refusal_text(name: &str, outcome: &OutcomeText) -> String {
-    format!("{name}: {}", outcome.reason.map_or("unknown reason".into(), Refusal::text))
+    let text = if outcome.text.is_empty() { "unknown reason" } else { &outcome.text };
+    format!("{name}: {text}")
 }
 
 fn respond(responder: Responder, outcome: &OutcomeText) {

@@ -47,6 +47,7 @@ impl Sink for FoxgloveSink {
                 self.bridge.set_epoch(scene.stamp.epoch);
                 self.publisher.begin_load(scene);
             }
+            Update::Topology(topology) => self.publisher.publish_topology(&topology),
             Update::Colliders(colliders) => self.publisher.publish_colliders(colliders),
             Update::Torn(torn) => self.publisher.publish_torn(&torn),
             Update::State(state) => self.publisher.publish_state(&state),

@@ -28,6 +28,11 @@ pub fn check(command: &Command) -> Result<(), Reason> {
             within(*over_s, BRUSH_OVER_S_MIN, GRAB_OVER_S_MAX)?;
             cap.map_or(Ok(()), |cap| within(cap, 0.0, f32::MAX))
         }
+        Command::Push { center, radius, delta, limit } => {
+            points(&[*center, *delta])?;
+            within(*radius, 0.0, COORDINATE_MAX)?;
+            limit.map_or(Ok(()), |limit| within(limit, 0.0, f32::MAX))
+        }
         Command::Cut { constraints, .. } => at_most(constraints.len(), CONSTRAINTS_PER_CUT_MAX),
         Command::CutSegment { from, to, direction: along } => {
             points(&[*from, *to, *along])?;

@@ -81,6 +81,13 @@ pub enum Command {
         #[serde(default)]
         cap: Option<f32>,
     },
+    Push {
+        center: [f32; 3],
+        radius: f32,
+        delta: [f32; 3],
+        #[serde(default)]
+        limit: Option<f32>,
+    },
     Pin {
         particle: u32,
     },
@@ -162,6 +169,7 @@ impl Command {
             Self::Move { .. } => "move",
             Self::Release { .. } => "release",
             Self::Brush { .. } => "brush",
+            Self::Push { .. } => "push",
             Self::Pin { .. } => "pin",
             Self::Unpin { .. } => "unpin",
             Self::Cut { .. } => "cut",

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use serde::{Serialize, Serializer};
-use sim_contract::Reason;
+use sim_contract::{Action, Parameter, Reason};
 
 use crate::limits::GRABS_PER_CLIENT_MAX;
 
@@ -12,6 +12,8 @@ use crate::limits::GRABS_PER_CLIENT_MAX;
 pub enum Refusal {
     /// The node gave a reason.
     Node(Reason),
+    /// The node refused a value of this parameter.
+    OutsideRange(Parameter),
     /// The node gave a reason that this version does not know.
     Unknown,
     /// No node runs.
@@ -20,6 +22,8 @@ pub enum Refusal {
     NoAnswer,
     /// Too many commands wait.
     Busy,
+    /// No built-in scene has the name.
+    UnknownScene,
     /// The page showed another load.
     StaleEpoch,
     /// The client grabs too many particles.
@@ -37,14 +41,28 @@ impl From<Reason> for Refusal {
 }
 
 impl Refusal {
+    /// The reason for which the node refused an action.
+    pub(crate) fn of_action(reason: Reason, action: &Action) -> Self {
+        let parameter = match action {
+            Action::Set { parameter, .. } => Parameter::from_name(parameter.as_str()),
+            _ => None,
+        };
+        match (reason, parameter) {
+            (Reason::OutOfRange, Some(parameter)) => Self::OutsideRange(parameter),
+            _ => Self::Node(reason),
+        }
+    }
+
     /// Name in messages.
     pub fn name(self) -> &'static str {
         match self {
             Self::Node(reason) => reason.name(),
+            Self::OutsideRange(_) => Reason::OutOfRange.name(),
             Self::Unknown => "unknown",
             Self::NoNode => "no_node",
             Self::NoAnswer => "no_answer",
             Self::Busy => "busy",
+            Self::UnknownScene => "unknown_scene",
             Self::StaleEpoch => "stale_epoch",
             Self::TooManyGrabs => "too_many_grabs",
             Self::OnlyLive => "only_live",
@@ -52,19 +70,22 @@ impl Refusal {
         }
     }
 
-    /// Sentence for the user.
-    pub fn text(self) -> Cow<'static, str> {
+    /// Sentence for the user about a command of the type `kind`: the reason, and the remedy where one is
+    /// known.
+    pub fn text(self, kind: &str) -> Cow<'static, str> {
         let text = match self {
-            Self::Node(Reason::NoEffectHere) => {
-                "the command has no effect here: the particle is frozen, the parameter belongs to \
-                 the other method, the simulation is running, the scene needs too much memory, or a \
-                 recording is playing"
+            Self::Node(reason) => return reason_text(reason, kind),
+            Self::OutsideRange(parameter) => {
+                let info = parameter.info();
+                return format!("{} accepts {}", info.name, info.range.text).into();
             }
-            Self::Node(reason) => return reason.to_string().into(),
             Self::Unknown => "the node gave an unknown reason",
-            Self::NoNode => "no node is running",
+            Self::NoNode => "no node is running; start one with `sim-node run`",
             Self::NoAnswer => "the node did not answer; the command may still take effect",
             Self::Busy => "too many commands are waiting; try again",
+            Self::UnknownScene => {
+                "there is no built-in scene of this name; `sim-node scenes` lists them"
+            }
             Self::StaleEpoch => "another scene was loaded in the meantime",
             Self::TooManyGrabs => {
                 return format!("you have already grabbed {GRABS_PER_CLIENT_MAX} particles").into();
@@ -76,8 +97,58 @@ impl Refusal {
     }
 }
 
+/// Explains a reason of the node. The node gives the same reason for different commands.
+fn reason_text(reason: Reason, kind: &str) -> Cow<'static, str> {
+    let text = match (reason, kind) {
+        (Reason::NoEffectHere, "load") => {
+            "the scene needs more shared memory than is free; end other programs that use it, or \
+             load a smaller scene (the messages of the node have the figures)"
+        }
+        (Reason::OutOfRange, "load") => {
+            "the node cannot run the scene with its options --rate and --substeps; start it \
+             without them (the messages of the node have the details)"
+        }
+        (Reason::NoEffectHere, "step") => "the simulation is running; pause it first",
+        (Reason::NoEffectHere, "set") => {
+            "the scene has nothing that it applies to: stiffness belongs to the method pbd, \
+             compliance to xpbd, and bending to scenes with bends"
+        }
+        (Reason::NoEffectHere, "grab" | "move" | "release" | "pin" | "unpin" | "brush") => {
+            "the particle is frozen, because its state was no longer finite; reset restores it"
+        }
+        (Reason::GrabbedByOther, _) => {
+            "another client has grabbed the particle; it is free once that client releases it"
+        }
+        _ => return reason.to_string().into(),
+    };
+    text.into()
+}
+
 impl Serialize for Refusal {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.serialize_str(self.name())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_text_belongs_to_the_command_and_names_a_remedy() {
+        let reason = Refusal::Node(Reason::NoEffectHere);
+        for (kind, remedy) in
+            [("load", "end other programs"), ("step", "pause it first"), ("pin", "reset restores")]
+        {
+            let text = reason.text(kind);
+            assert!(text.contains(remedy), "{kind}: {text}");
+        }
+        let load = Refusal::Node(Reason::OutOfRange).text("load");
+        assert!(load.contains("--rate") && load.contains("without them"), "{load}");
+        assert_eq!(
+            Refusal::OutsideRange(Parameter::TearForce).text("set"),
+            "tear_force accepts a number > 0"
+        );
+        assert!(Refusal::UnknownScene.text("load").contains("sim-node scenes"));
     }
 }

@@ -246,7 +246,7 @@ impl OutcomeText {
     pub(crate) fn explain(&mut self, reason: Refusal) {
         if self.reason.is_none() {
             self.reason = Some(reason);
-            self.text = reason.text().into_owned();
+            self.text = reason.text(self.kind).into_owned();
         }
     }
 }

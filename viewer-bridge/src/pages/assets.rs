@@ -10,7 +10,7 @@ use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use xxhash_rust::xxh3::xxh3_64;
 
-use files::FILES;
+use files::{FILES, PICTURES};
 
 /// The origin of the files.
 #[derive(Debug, Clone, Default)]
@@ -54,10 +54,14 @@ impl Assets {
     }
 
     fn content(&self, path: &str) -> Option<Vec<u8>> {
+        // The pictures belong to the built-in scenes, so a folder for development has none.
+        if let Some((_, content)) = PICTURES.iter().find(|(known, _)| *known == path) {
+            return Some(content.to_vec());
+        }
         match self {
             Self::Embedded => {
                 let file = FILES.iter().find(|(known, _)| *known == path);
-                file.map(|(_, content)| content.as_bytes().to_vec())
+                file.map(|(_, content)| content.to_vec())
             }
             Self::Folder(folder) => {
                 // A path that leaves the folder, by dots or by a link, does not exist.
@@ -87,6 +91,7 @@ mod tests {
     use std::collections::BTreeSet;
 
     use super::*;
+    use crate::scene::catalog;
 
     fn status(assets: &Assets, path: &str) -> StatusCode {
         assets.answer(path, &HeaderMap::new()).status()
@@ -124,6 +129,19 @@ mod tests {
         add_files(&folder, &mut paths);
         let embedded: BTreeSet<_> = FILES.iter().map(|(path, _)| folder.join(path)).collect();
         assert_eq!(embedded, paths);
+    }
+
+    #[test]
+    fn every_built_in_scene_has_a_picture() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("web");
+        for assets in [Assets::Embedded, Assets::folder(&folder).unwrap()] {
+            for scene in catalog::all() {
+                let path = format!("pictures/{}.png", scene.name);
+                let answer = assets.answer(&path, &HeaderMap::new());
+                assert_eq!(answer.status(), StatusCode::OK, "{path}");
+                assert_eq!(answer.headers()[header::CONTENT_TYPE], "image/png");
+            }
+        }
     }
 
     #[test]

@@ -277,8 +277,8 @@ impl Sink for Hub {
             Update::Answer { client, outcome } => {
                 self.send(client, &ToPage::Outcome(outcome.clone()));
             }
-            // Pages receive the answers to their own commands, and statistics.
-            Update::Status(_) | Update::Outcome(_) => {}
+            // Pages receive the answers to their own commands, and statistics, and the topology in SCENE.
+            Update::Topology(_) | Update::Status(_) | Update::Outcome(_) => {}
         }
     }
 }

@@ -16,7 +16,7 @@ use super::assets::Assets;
 use super::hub::Hub;
 use super::session::{self, Sessions};
 use crate::shutdown::Shutdown;
-use crate::socket::guard::{Guard, guarded};
+use crate::socket::guard::{Guard, TokenDemand, guarded};
 use crate::socket::listen::{HttpListener, client_permits, remedy};
 use crate::socket::lobby::Place;
 use crate::socket::peer::limit;
@@ -28,6 +28,8 @@ pub struct ServerOptions {
     pub listen: SocketAddr,
     /// Names of this host besides its addresses.
     pub names: Vec<String>,
+    /// Servers whose pages need a token.
+    pub token: TokenDemand,
     /// Files of the page.
     pub assets: Assets,
 }
@@ -73,7 +75,7 @@ impl Server {
         let listener = HttpListener::bind(address)
             .await
             .map_err(|cause| ServerError::Listen { address, cause })?;
-        let guard = Guard::new(listener.address(), options.names);
+        let guard = Guard::new(listener.address(), options.names, options.token);
         let guard = Arc::new(guard.map_err(ServerError::NoRandomNumber)?);
         Ok(Self { listener, guard, assets: options.assets })
     }
@@ -81,7 +83,12 @@ impl Server {
     /// Address to open in a browser. The token follows the `#`, which no browser sends.
     pub fn url(&self) -> String {
         let token = self.guard.token().map(|token| format!("#token={token}"));
-        format!("http://{}/{}", self.listener.address(), token.unwrap_or_default())
+        format!("http://{}/{}", self.guard.reachable_authority(), token.unwrap_or_default())
+    }
+
+    /// Returns whether only programs of this host can connect.
+    pub fn is_local(&self) -> bool {
+        self.guard.is_local()
     }
 
     /// Serves until the shutdown begins and every page has been informed.

@@ -4,6 +4,7 @@ use sim_contract::{ConstraintState, LoadHeader, ParticleState, Triangle};
 use thiserror::Error;
 
 use super::summary::SceneSummary;
+use crate::sink::Topology;
 use crate::wire::{Scene, SceneText, Stamp, scene_flag};
 
 /// A load of a scene.
@@ -38,6 +39,15 @@ impl Load {
             return Err(LoadError::Triangle);
         }
         Ok(self)
+    }
+
+    /// The message with the constraints and triangles.
+    pub(crate) fn topology(&self) -> Topology<'_> {
+        Topology {
+            header: &self.header,
+            constraints: &self.constraints,
+            triangles: &self.triangles,
+        }
     }
 
     /// "xpbd" or "pbd".

@@ -15,6 +15,8 @@ use axum::middleware::{self, Next};
 use axum::response::{IntoResponse, Response};
 use thiserror::Error;
 
+use super::local_address::local_address;
+
 /// The headers of every response.
 const HEADERS: [(HeaderName, HeaderValue); 7] = [
     (
@@ -45,10 +47,20 @@ pub(crate) struct Guard {
     address: SocketAddr,
     /// Names of this host besides its addresses.
     names: Vec<String>,
-    /// Secret that a page must know, where other machines can reach the server.
+    /// Secret that a page must know.
     token: Option<String>,
     /// Admitted origins; `None` admits the origins of this server's own pages.
     origins: Option<Vec<String>>,
+}
+
+/// The servers whose pages must know a token.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum TokenDemand {
+    /// Those that other machines can reach.
+    #[default]
+    BeyondLoopback,
+    /// Those on loopback as well.
+    Always,
 }
 
 /// The reason for which a request is denied.
@@ -72,16 +84,21 @@ pub(crate) enum Denied {
 }
 
 impl Guard {
-    /// Creates the rules of a server with pages. A server that does not listen on loopback demands a
-    /// token.
+    /// Creates the rules of a server with pages. A server that does not listen on loopback always
+    /// demands a token.
     ///
     /// # Errors
     /// The system provides no random numbers.
-    pub(crate) fn new(address: SocketAddr, names: Vec<String>) -> Result<Self, getrandom::Error> {
-        let token = if address.ip().is_loopback() {
-            None
-        } else {
+    pub(crate) fn new(
+        address: SocketAddr,
+        names: Vec<String>,
+        demand: TokenDemand,
+    ) -> Result<Self, getrandom::Error> {
+        let is_demanded = demand == TokenDemand::Always || !address.ip().is_loopback();
+        let token = if is_demanded {
             Some(format!("{:016x}{:016x}", getrandom::u64()?, getrandom::u64()?))
+        } else {
+            None
         };
         Ok(Self { address, names, token, origins: None })
     }
@@ -90,6 +107,20 @@ impl Guard {
     /// origin, and pages of these origins.
     pub(crate) fn for_origins(address: SocketAddr, origins: Vec<String>) -> Self {
         Self { address, names: Vec::new(), token: None, origins: Some(origins) }
+    }
+
+    /// Address by which a browser reaches the server: a name of the host if it has one, otherwise an
+    /// address that other machines can reach where the server listens at all of them.
+    pub(crate) fn reachable_authority(&self) -> String {
+        let port = self.address.port();
+        if !self.address.ip().is_unspecified() {
+            return self.address.to_string();
+        }
+        match (self.names.first(), local_address(self.address.ip())) {
+            (Some(name), _) => format!("{name}:{port}"),
+            (None, Some(address)) => SocketAddr::new(address, port).to_string(),
+            (None, None) => self.address.to_string(),
+        }
     }
 
     /// The token, where one is demanded.
@@ -123,13 +154,15 @@ impl Guard {
         }
     }
 
+    /// Returns whether only programs of this host can connect.
+    pub(crate) fn is_local(&self) -> bool {
+        self.address.ip().is_loopback()
+    }
+
     /// Returns whether a page at `origin` is one of this server's, when its browser calls the server
     /// `host`.
     fn is_same_origin(&self, origin: &str, host: &str) -> bool {
-        match &self.token {
-            None => self.is_own(origin),
-            Some(_) => origin.eq_ignore_ascii_case(host),
-        }
+        if self.is_local() { self.is_own(origin) } else { origin.eq_ignore_ascii_case(host) }
     }
 
     /// Returns whether `authority` is this server: a name or address, and the port unless it is 80.
@@ -145,7 +178,7 @@ impl Guard {
         if let Ok(address) = address {
             // A page cannot redirect an address, so every address is allowed where the server can
             // have several.
-            return self.token.is_some() || address.is_loopback();
+            return !self.is_local() || address.is_loopback();
         }
         name.eq_ignore_ascii_case("localhost")
             || self.names.iter().any(|own| name.eq_ignore_ascii_case(own))
@@ -186,7 +219,8 @@ mod tests {
     use super::*;
 
     fn guard(address: &str) -> Guard {
-        Guard::new(address.parse().unwrap(), vec!["lab".to_owned()]).unwrap()
+        let names = vec!["lab".to_owned()];
+        Guard::new(address.parse().unwrap(), names, TokenDemand::BeyondLoopback).unwrap()
     }
 
     fn admits(guard: &Guard, host: &str, origin: Option<&str>) -> bool {
@@ -241,6 +275,34 @@ mod tests {
         );
         assert!(!guard.accepts(Some(&token.replace(&token[..1], "g"))));
         assert!(self::guard("[::1]:8080").accepts(None));
+    }
+
+    #[test]
+    fn on_loopback_a_token_can_be_demanded_and_foreign_hosts_stay_out() {
+        let address = "127.0.0.1:8080".parse().unwrap();
+        let guard = Guard::new(address, Vec::new(), TokenDemand::Always).unwrap();
+        let token = guard.token().unwrap().to_owned();
+        assert!(guard.accepts(Some(&token)) && !guard.accepts(None));
+        assert!(guard.is_local());
+        assert!(admits(&guard, "localhost:8080", Some("http://127.0.0.1:8080")));
+        assert!(!admits(&guard, "10.0.0.7:8080", None));
+        assert!(!admits(&guard, "127.0.0.1:8080", Some("http://evil.example")));
+    }
+
+    #[test]
+    fn the_printed_address_can_be_reached() {
+        assert_eq!(guard("127.0.0.1:8080").reachable_authority(), "127.0.0.1:8080");
+        assert_eq!(guard("10.0.0.7:8080").reachable_authority(), "10.0.0.7:8080");
+        // A name is best where one is given.
+        assert_eq!(guard("0.0.0.0:8080").reachable_authority(), "lab:8080");
+        let address = "0.0.0.0:8080".parse().unwrap();
+        let unnamed = Guard::new(address, Vec::new(), TokenDemand::BeyondLoopback).unwrap();
+        let printed: SocketAddr = unnamed.reachable_authority().parse().unwrap();
+        // Only a host without a network has no address to offer.
+        let own = local_address(address.ip());
+        assert_eq!(printed.ip().is_unspecified(), own.is_none());
+        assert!(own.is_none_or(|own| printed == SocketAddr::new(own, 8080)));
+        assert!(admits(&unnamed, &printed.to_string(), Some(&format!("http://{printed}"))));
     }
 
     #[test]

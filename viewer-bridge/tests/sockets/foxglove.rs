@@ -153,9 +153,19 @@ fn a_client_receives_only_the_topics_that_it_subscribed_to() {
     let mut site = FoxgloveSite::start(options());
     let (mut client, server) = Client::start(&site.url);
     assert_eq!(server["name"], "catenary");
-    let topics =
-        ["/tf", "/colliders", "/tears", "/outcomes", "/status", "/steps", "/particles", "/scene"]
-            .map(Some);
+    let topics = [
+        "/tf",
+        "/topology",
+        "/surface",
+        "/colliders",
+        "/tears",
+        "/outcomes",
+        "/status",
+        "/steps",
+        "/particles",
+        "/scene",
+    ]
+    .map(Some);
     let mut advertised: Vec<_> = client.topics().into_iter().map(Some).collect();
     advertised.sort_by_key(|topic| topics.iter().position(|one| one == topic));
     assert_eq!(advertised, topics);
@@ -332,7 +342,8 @@ fn an_invalid_command_is_refused_and_does_not_reach_the_source() {
         json!({ "kind": "dance" }),
         json!({ "kind": "grab", "particle": 1, "target": [1e9, 0, 0] }),
         json!({ "kind": "cut_radius", "center": ["nan", 0, 0], "radius": 1 }),
-        json!({ "kind": "push", "center": [0, 0, 0], "radius": 1, "delta": [0, 0, 0] }),
+        json!({ "kind": "push", "center": [0, 0, 0], "radius": -1, "delta": [0, 0, 0] }),
+        json!({ "kind": "rewind", "to_step": 3 }),
     ] {
         let (mut client, _) = Client::start(&site.url);
         client.advertise(1, "/commands");

@@ -2,6 +2,7 @@
 
 use tungstenite::Message;
 use tungstenite::http::{HeaderValue, header};
+use viewer_bridge::TokenDemand;
 use viewer_bridge::limits::VISITORS_MAX;
 use viewer_bridge::sink::Update;
 
@@ -60,9 +61,8 @@ fn every_answer_has_the_security_headers() {
     }
 }
 
-#[test]
-fn the_token_is_required_on_other_addresses_than_loopback() {
-    let site = Site::listen("0.0.0.0:0");
+/// Checks that a server accepts only pages with the token in its address.
+fn check_token(site: &Site) {
     let token = site.url.split_once("#token=").unwrap().1.to_owned();
     for hello in [
         r#"{"type":"hello","protocol":2}"#.to_owned(),
@@ -79,8 +79,25 @@ fn the_token_is_required_on_other_addresses_than_loopback() {
 }
 
 #[test]
-fn there_is_no_token_on_loopback() {
+fn the_token_is_required_on_other_addresses_than_loopback() {
+    let site = Site::listen("0.0.0.0:0");
+    check_token(&site);
+    // A browser on another machine cannot open the address that the server listens at.
+    assert!(!site.url.contains("//0.0.0.0") || !has_network(), "{}", site.url);
+}
+
+/// Returns whether this host has an address besides loopback on the way to other networks.
+fn has_network() -> bool {
+    let socket = std::net::UdpSocket::bind("0.0.0.0:0").unwrap();
+    socket.connect("203.0.113.1:9").is_ok()
+}
+
+#[test]
+fn on_loopback_the_token_is_required_only_on_demand() {
     assert!(!Site::start().url.contains('#'));
+    let site = Site::with_token("127.0.0.1:0", TokenDemand::Always);
+    assert!(site.url.starts_with("http://127.0.0.1:"), "{}", site.url);
+    check_token(&site);
 }
 
 #[test]

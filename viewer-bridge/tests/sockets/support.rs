@@ -21,7 +21,7 @@ use viewer_bridge::request::{Requests, requests};
 use viewer_bridge::sink::{State, Update};
 use viewer_bridge::source::shown_state::ShownState;
 use viewer_bridge::wire::{self, Scene, decode};
-use viewer_bridge::{Hub, Server, ServerOptions, Shutdown, Sinks};
+use viewer_bridge::{Hub, Server, ServerOptions, Shutdown, Sinks, TokenDemand};
 
 /// Limit on every wait. It is generous, because the machine may be busy.
 const DEADLINE: Duration = Duration::from_mins(1);
@@ -51,11 +51,17 @@ impl Site {
     }
 
     pub(crate) fn listen(address: &str) -> Self {
+        Self::with_token(address, TokenDemand::BeyondLoopback)
+    }
+
+    /// Starts a server at an address, which may need a token.
+    pub(crate) fn with_token(address: &str, token: TokenDemand) -> Self {
         allow_many_open_files();
         let runtime = Runtime::new().unwrap();
         let options = ServerOptions {
             listen: address.parse().unwrap(),
             names: Vec::new(),
+            token,
             assets: Assets::Embedded,
         };
         let server = runtime.block_on(Server::bind(options)).unwrap();

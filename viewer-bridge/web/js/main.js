@@ -9,6 +9,7 @@ import { find } from "./ui/dom.js";
 import { Renderer } from "./gl/renderer.js";
 import { Hud } from "./ui/hud.js";
 import { Input } from "./tools/input.js";
+import { Hint, Question } from "./ui/prompts.js";
 import { parseLink } from "./ui/link.js";
 import { Overlay } from "./ui/overlay.js";
 import { Panel } from "./panel/panel.js";
@@ -42,6 +43,7 @@ function openRenderer() {
     return new Renderer(find("picture-canvas", HTMLCanvasElement), simulation, camera, antialias);
   } catch (error) {
     faults.push(String(error));
+    document.body.classList.add("is-unusable");
     banner.set("fatal", "This page needs WebGL2, which this browser does not provide. Try another browser, or turn on hardware acceleration.");
     return null;
   }
@@ -64,6 +66,7 @@ function start(renderer) {
     onText: (message) => simulation.receiveText(message),
     onChange: (connection) => {
       banner.set("connection", connection.state === "open" ? "" : connection.text);
+      simulation.setConnected(connection.state === "open");
       if (connection.state === "waiting" || connection.state === "refused") {
         commands.clear();
         input.abandon();
@@ -86,8 +89,9 @@ function start(renderer) {
   const views = new Views(app, banner);
   const timeline = new TimelineBar(simulation, commands);
   const controls = new Controls(app, input, views, timeline, banner);
-  const panel = new Panel(find("parameters", HTMLFormElement), find("parameters-note", HTMLElement), simulation, commands);
+  const panel = new Panel(find("parameters", HTMLFormElement), find("parameters-note", HTMLElement), app, banner);
   new Charts(find("plots", HTMLElement), find("figures", HTMLElement), simulation);
+  new Hint(app, input);
   const hud = new Hud(find("hud", HTMLOutputElement), simulation, renderer);
 
   listenToSimulation(input);
@@ -157,22 +161,26 @@ function listenToSurroundings(renderer, connector) {
   });
 }
 
-/** Applies the scene, camera and toggles of the address, once the scene is known. @param {Views} views @param {Controls} controls */
+/** Applies the camera and toggles of the address, once the scene is known. A link to another scene never
+ * loads it by itself: the page asks. @param {Views} views @param {Controls} controls */
 function followLink(views, controls) {
   for (const [name, isOn] of Object.entries(link.toggles)) if (name in views.app.renderer.toggles) views.chosen.set(name, isOn);
-  let requested = link.scene;
-  const isReady = () => simulation.scene !== null && simulation.hello !== null && simulation.node !== null;
-  let pose = link.camera;
-  const follow = () => {
-    if (!isReady()) return;
-    const isOther = requested !== null && requested !== simulation.scene?.name && controls.canChange();
-    if (isOther && requested !== null) controls.load(requested);
-    else {
-      views.linkedPose = pose;
-      pose = null;
-    }
-    requested = null;
-  };
+  const { scene: requested, camera: pose } = link;
+  let isFollowed = false;
   // Runs before the first frame of the scene, when the view applies the linked pose.
-  simulation.on("scene", follow);
+  simulation.on("scene", ({ name }) => {
+    if (isFollowed || simulation.hello === null || simulation.node === null) return;
+    isFollowed = true;
+    if (requested === null || requested === name || !controls.canChange()) views.linkedPose = pose;
+    else ask(requested, name);
+  });
+  /** @param {string} wanted @param {string} present */
+  const ask = (wanted, present) => new Question().ask(
+    { text: `This link shows the scene “${wanted}”. Loading it replaces “${present}” for everybody.`, yes: `Load ${wanted}`, no: `Keep ${present}` },
+    (isYes) => {
+      if (!isYes) return;
+      views.poseOfScene = pose === null ? null : { scene: wanted, pose };
+      controls.load(wanted);
+    },
+  );
 }

@@ -54,3 +54,16 @@ test("a lost connection drops the tool without a message", () => {
   input.abandon();
   assert.deepEqual([sent.length, input.tool], [1, null]);
 });
+
+test("a motion after a rest is as quick as one without", () => {
+  const { input, sent } = pressed();
+  const start = input.tool.sentMs;
+  const moves = () => sent.filter(({ type }) => type === "move");
+  input.tick(start + 16);
+  // The pointer rests for a second.
+  for (let ms = 32; ms <= 1000; ms += 16) input.tick(start + ms);
+  input.tool.move({ x: 500, y: 300 });
+  input.tick(start + 1016);
+  assert.equal(moves().length, 2);
+  assert.ok(moves()[1].over_s < 0.03, `${moves()[1].over_s} s`);
+});

@@ -2,7 +2,7 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { ROWS, SLIDER_STEPS, positionOf, rangeOf, rowsOf, valueAt, valueOf } from "../js/panel/parameters.js";
+import { ROWS, SLIDER_STEPS, editable, positionOf, rangeOf, restoring, rowsOf, typedValue, valueAt, valueOf } from "../js/panel/parameters.js";
 import { Series } from "../js/panel/series.js";
 import { niceCeiling, readable } from "../js/ui/format.js";
 
@@ -71,4 +71,33 @@ test("a parameter is read for one constraint kind, and infinity is a word", () =
   assert.equal(valueOf(values, "tear_force", "structural"), null);
   assert.equal(valueOf(values, "max_speed", "structural"), Infinity);
   assert.equal(valueOf(null, "damping", "structural"), null);
+});
+
+const row = (name) => ROWS.find((one) => one.name === name);
+
+test("a typed value is a number, or off where the parameter can be off", () => {
+  assert.equal(typedValue(row("damping"), " 0.25 "), 0.25);
+  assert.equal(typedValue(row("damping"), "0,25"), 0.25);
+  assert.equal(typedValue(row("tear_force"), "1e-3"), 0.001);
+  assert.equal(typedValue(row("tear_force"), "Off"), null);
+  assert.equal(typedValue(row("iterations"), "8"), 8);
+  for (const [name, text] of [["damping", "off"], ["damping", ""], ["damping", "fast"], ["damping", "1/0"], ["damping", "Infinity"], ["iterations", "1.5"]]) {
+    assert.equal(typedValue(row(name), text), undefined, `${name} ${text}`);
+  }
+});
+
+test("a shown value keeps the digits of a 32-bit number, so that typing it again changes nothing", () => {
+  for (const value of [0.3, 9.80665, 1e-7, -20, 0]) assert.equal(editable(Math.fround(value)), String(value));
+  assert.equal(editable(null), "off");
+});
+
+test("resetting the parameters changes those that differ, and names those that cannot be restored", () => {
+  const initial = { gravity: [0, -9.81, 0], damping: 0.3, tear_force: null, compliance: { structural: null, shear: 0.1 } };
+  const values = { gravity: [0, -9.81, 0], damping: 2, tear_force: 50, compliance: { structural: 1e-3, shear: 0.2 } };
+  const rows = ["gravity", "damping", "tear_force", "compliance"].map(row);
+  assert.deepEqual(restoring(rows, values, initial, ["structural", "shear"]), {
+    changes: [{ name: "damping", value: 0.3 }, { name: "tear_force", value: null }, { name: "compliance", value: 0.1, kind: "shear" }],
+    lost: ["Compliance"],
+  });
+  assert.deepEqual(restoring(rows, initial, initial, ["structural", "shear"]), { changes: [], lost: [] });
 });

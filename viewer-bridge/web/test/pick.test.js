@@ -69,7 +69,9 @@ test("segments cross if each has its ends on both sides of the other", () => {
   const from = { x: 0, y: 0 };
   const to = { x: 2, y: 2 };
   assert.ok(segmentsCross(0, 2, 2, 0, from, to));
-  assert.ok(segmentsCross(2, 0, 2, 2, from, to), "a touch counts");
+  // A stroke that ends on a stick crosses it at once, or when it goes on: exactly once.
+  const beyond = { x: 4, y: 3 };
+  assert.notEqual(segmentsCross(2, 0, 2, 4, from, to), segmentsCross(2, 0, 2, 4, to, beyond));
   assert.ok(!segmentsCross(0, 2, 0.9, 1.1, from, to), "too short");
   assert.ok(!segmentsCross(1, 0, 3, 2, from, to), "parallel");
   assert.ok(!segmentsCross(0.5, 0.5, 1, 1, from, to), "on the same line");

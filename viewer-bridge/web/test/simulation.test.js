@@ -2,7 +2,7 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { firstViewBox } from "../js/state/framing.js";
+import { firstViewBox, heldBox } from "../js/state/framing.js";
 import { Simulation } from "../js/state/simulation.js";
 
 const scene = (epoch, rest = {}) => ({
@@ -90,11 +90,12 @@ test("a new scene clears tears and pins", () => {
   assert.deepEqual([simulation.torn, simulation.pins.size, simulation.frame], [[], 0, null]);
 });
 
-test("the ground is a floor if there is one, else below the lowest reach", () => {
+test("a floor is drawn only if it holds, and the first view has room for what hangs", () => {
   const simulation = new Simulation();
   simulation.receive(scene(1));
   simulation.receive({ kind: "pins", epoch: 1, particles: Uint32Array.of(0), flags: Uint32Array.of(1) });
-  assert.ok(simulation.ground.offset < 0 && simulation.ground.offset > -0.1);
+  assert.equal(simulation.ground, null);
+  assert.ok(simulation.lowest <= 0 && firstViewBox(simulation).min[1] <= simulation.lowest);
   simulation.receive({ kind: "colliders", epoch: 1, colliders: [{ shape: "plane", normal: [0, 1, 0], offset: -2 }] });
   assert.equal(simulation.ground.offset, -2);
 });
@@ -112,4 +113,20 @@ test("the first view has room around a point, for a floor below, and for anchore
   carried.receive(scene(1));
   carried.receive({ kind: "pins", epoch: 1, particles: Uint32Array.of(0, 1), flags: Uint32Array.of(4, 4) });
   assert.ok(firstViewBox(carried).max[0] > carried.box().max[0]);
+});
+
+test("the view ignores parts that were cut off and have fallen away", () => {
+  const rope = { particleCount: 4, constraintCount: 3, positions: Float32Array.of(0, 0, 0, 1, 0, 0, 2, 0, 0, 3, 0, 0), ends: Uint32Array.of(0, 1, 1, 2, 2, 3), restLengths: Float32Array.of(1, 1, 1), constraintKinds: new Uint8Array(3) };
+  const fallen = Float32Array.of(0, 0, 0, 1, 0, 0, 2, -900, 0, 3, -900, 0);
+  const simulation = new Simulation();
+  simulation.receive(scene(1, rope));
+  simulation.receive({ ...frame(1, 1), particleCount: 4, positions: fallen });
+  simulation.receive({ kind: "pins", epoch: 1, particles: Uint32Array.of(0), flags: Uint32Array.of(1) });
+  assert.equal(heldBox(simulation).min[1], -900, "a stretched part is no fallen one");
+  simulation.receive(tear(1, 0, 1));
+  assert.deepEqual(heldBox(simulation), { min: [0, 0, 0], max: [1, 0, 0] });
+  // Without anything that holds, the largest part is the scene.
+  simulation.receive({ kind: "pins", epoch: 1, particles: new Uint32Array(0), flags: new Uint32Array(0) });
+  simulation.receive(tear(1, 1, 2));
+  assert.deepEqual(heldBox(simulation), { min: [0, 0, 0], max: [1, 0, 0] });
 });

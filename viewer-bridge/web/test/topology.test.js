@@ -61,6 +61,79 @@ test("a fan has the rest length to its first corner, or 0 without a constraint",
   assert.equal(bare.fans[2], 0);
 });
 
+/** Area of the drawn triangles and pieces, where each particle is at `at`. Each must face the viewer. */
+function drawnArea(topology, at) {
+  const { vertices, indices } = topology.pieces();
+  const floats = new Float32Array(vertices.buffer);
+  const point = (index) => {
+    const k = index - topology.scene.particleCount;
+    if (k < 0) return at(index);
+    const [a, p, q] = [...vertices.subarray(8 * k, 8 * k + 3)].map(at);
+    return a.map((x, axis) => x + floats[8 * k + 4] * (p[axis] - x) + floats[8 * k + 5] * (q[axis] - x));
+  };
+  const corners = [...topology.indices.filter((_, i) => !topology.isDead[Math.floor(i / 3)]), ...indices];
+  let area = 0;
+  for (let i = 0; i < corners.length; i += 3) {
+    const [a, b, c] = corners.slice(i, i + 3).map(point);
+    const twice = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+    assert.ok(twice > -1e-6, `piece ${i / 3} is turned over`);
+    area += twice / 2;
+  }
+  return area;
+}
+
+const restAt = (scene) => (p) => [...scene.positions.subarray(3 * p, 3 * p + 2)];
+
+/** All constraints between two rows, as a cut between them tears. */
+const between = (scene, columns, row) => Array.from({ length: scene.constraintCount }, (_, i) => i)
+  .filter((i) => Math.floor(scene.ends[2 * i] / columns) !== Math.floor(scene.ends[2 * i + 1] / columns) && Math.floor(scene.ends[2 * i] / columns) === row);
+
+/** Greatest area of a cut line through the sheet: four cells long, a twentieth of a cell wide. */
+const LINE = 4 / 20;
+
+test("a cut is a line: the pieces of a sheet at rest cover all but that line", () => {
+  for (const torn of [(scene) => [find(scene, 3, 4)], (scene) => between(scene, 5, 1), (scene) => [find(scene, 6, 7), find(scene, 7, 12), find(scene, 6, 12)]]) {
+    const scene = sheet(5, 4);
+    const topology = new Topology(scene);
+    assert.equal(drawnArea(topology, restAt(scene)), 12);
+    topology.remove(torn(scene));
+    const area = drawnArea(topology, restAt(scene));
+    assert.ok(area > 12 - LINE && area < 12, `${area}`);
+    topology.restore();
+    assert.equal(topology.pieces().indices.length, 0);
+  }
+});
+
+test("the halves of a cut sheet part along the line, and each keeps its own area and shape", () => {
+  const scene = sheet(5, 4);
+  const topology = new Topology(scene);
+  topology.remove(between(scene, 5, 1));
+  // The lower half falls, and turns by a right angle.
+  const apart = (p) => {
+    const [x, y] = restAt(scene)(p);
+    return p < 10 ? [x, y] : [-y + 3, x - 9];
+  };
+  assert.ok(Math.abs(drawnArea(topology, apart) - drawnArea(topology, restAt(scene))) < 1e-5);
+});
+
+test("a cut through cells without diagonal constraints parts them as well", () => {
+  const scene = sheet(5, 4);
+  const kept = Array.from({ length: scene.constraintCount }, (_, i) => i).filter((i) => scene.constraintKinds[i] === 0);
+  const bare = { ...scene, ends: Uint32Array.from(kept.flatMap((i) => [scene.ends[2 * i], scene.ends[2 * i + 1]])), restLengths: scene.restLengths.filter((_, i) => kept.includes(i)), constraintKinds: new Uint8Array(kept.length), constraintCount: kept.length };
+  const topology = new Topology(bare);
+  topology.remove(between(bare, 5, 1));
+  const apart = (p) => restAt(bare)(p).map((value, axis) => (axis === 1 && p >= 10 ? value - 7 : value));
+  assert.ok(Math.abs(drawnArea(topology, apart) - drawnArea(topology, restAt(bare))) < 1e-5, "no piece spans the gap");
+});
+
+test("a particle that hangs on nothing has no piece", () => {
+  const scene = sheet(3, 3);
+  const topology = new Topology(scene);
+  topology.remove(Array.from({ length: scene.constraintCount }, (_, i) => i).filter((i) => scene.ends[2 * i] === 4 || scene.ends[2 * i + 1] === 4));
+  const { vertices } = topology.pieces();
+  for (let k = 0; k < vertices.length; k += 8) assert.ok(!vertices.subarray(k, k + 3).includes(4));
+});
+
 test("a torn structural constraint removes the triangles along it and no others", () => {
   const scene = sheet(3, 3);
   const topology = new Topology(scene);

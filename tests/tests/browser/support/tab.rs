@@ -289,6 +289,21 @@ impl Tab {
         }
     }
 
+    /// Presses and releases a key that types no character.
+    pub(crate) fn named_key(&self, key: &str) {
+        for kind in ["keyDown", "keyUp"] {
+            self.call("Input.dispatchKeyEvent", json!({ "type": kind, "key": key }));
+        }
+    }
+
+    /// Clicks a text field, replaces its text, and confirms it.
+    pub(crate) fn type_into(&self, selector: &str, text: &str) {
+        self.evaluate(&format!("document.querySelector({selector:?}).scrollIntoView()"));
+        self.click(selector);
+        self.call("Input.insertText", json!({ "text": text }));
+        self.named_key("Enter");
+    }
+
     /// Presses the pause key, and waits until the page knows that the node is paused.
     pub(crate) fn pause(&self) {
         self.key(' ');

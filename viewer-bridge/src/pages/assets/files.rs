@@ -3,12 +3,12 @@
 /// Pairs each path with the content of the file. A missing file does not compile.
 macro_rules! files {
     ($($path:literal),* $(,)?) => {
-        &[$(($path, include_str!(concat!("../../../web/", $path)))),*]
+        &[$(($path, include_bytes!(concat!("../../../web/", $path)).as_slice())),*]
     };
 }
 
 /// The files of the page: path and content.
-pub(super) const FILES: &[(&str, &str)] = files![
+pub(super) const FILES: &[(&str, &[u8])] = files![
     "app.css",
     "index.html",
     "js/geometry/camera.js",
@@ -34,10 +34,12 @@ pub(super) const FILES: &[(&str, &str)] = files![
     "js/panel/panel.js",
     "js/panel/parameters.js",
     "js/panel/series.js",
+    "js/panel/value-field.js",
     "js/state/emitter.js",
     "js/state/framing.js",
     "js/state/hanging.js",
     "js/state/simulation.js",
+    "js/state/splits.js",
     "js/state/topology.js",
     "js/tools/brush.js",
     "js/tools/cut.js",
@@ -54,8 +56,43 @@ pub(super) const FILES: &[(&str, &str)] = files![
     "js/ui/keys.js",
     "js/ui/link.js",
     "js/ui/overlay.js",
+    "js/ui/prompts.js",
+    "js/ui/scene-menu.js",
     "js/ui/timeline-bar.js",
     "js/ui/timeline.js",
     "js/ui/views.js",
     "js/viewer.js",
+];
+
+/// Pairs the path of the picture of each scene with its content.
+macro_rules! pictures {
+    ($($name:literal),* $(,)?) => {
+        &[$((
+            concat!("pictures/", $name, ".png"),
+            include_bytes!(concat!("../../../pictures/", $name, ".png")).as_slice(),
+        )),*]
+    };
+}
+
+/// The pictures of the built-in scenes: path and content.
+pub(super) const PICTURES: &[(&str, &[u8])] = pictures![
+    "carried-cloth",
+    "coiled-rope",
+    "covered-bust",
+    "curtain",
+    "drop-box",
+    "drop-box-braced",
+    "elastic-mesh",
+    "flag",
+    "folding-cloth",
+    "free-fall",
+    "pendulum",
+    "ragdoll",
+    "ragdolls-in-net",
+    "rope",
+    "rope-bridge",
+    "spider-web",
+    "spring-cloth",
+    "tearable-cloth",
+    "two-flags",
 ];

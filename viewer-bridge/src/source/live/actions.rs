@@ -12,6 +12,9 @@ pub(super) fn actions(
     command: Command,
     context: CommandContext<'_>,
 ) -> Result<Vec<Action>, Refusal> {
+    if context.is_replay && changes_simulation(&command) {
+        return Err(Refusal::OnlyLive);
+    }
     let action = match command {
         Command::Grab { particle, target, over_s } => Action::Grab { particle, target, over_s },
         Command::Move { particle, target, over_s } => Action::Move { particle, target, over_s },
@@ -20,6 +23,9 @@ pub(super) fn actions(
             let stroke = Stroke { eye, ray, radius, delta, over_s, cap };
             let push = stroke.push(context);
             return Ok(push.into_iter().collect());
+        }
+        Command::Push { center, radius, delta, limit } => {
+            Action::Push { center, radius, delta, limit }
         }
         Command::Pin { particle } => Action::Pin { particle },
         Command::Unpin { particle } => Action::Unpin { particle },
@@ -46,7 +52,7 @@ pub(super) fn actions(
         Command::Reset {} => Action::Reset,
         // A path would let anybody with the page read the files of the node's user.
         Command::Load { scene } if !catalog::is_known(&scene) => {
-            return Err(Reason::OutOfRange.into());
+            return Err(Refusal::UnknownScene);
         }
         Command::Load { scene } => {
             Action::Load { scene: Text::new(&scene).map_err(|_| Reason::OutOfRange)? }
@@ -66,4 +72,18 @@ pub(super) fn actions(
         Command::Seek { .. } | Command::Loop { .. } => return Err(Refusal::OnlyReplay),
     };
     Ok(vec![action])
+}
+
+/// Returns whether `recorder play` refuses a command that a node would apply.
+fn changes_simulation(command: &Command) -> bool {
+    match command {
+        Command::Pause {}
+        | Command::Resume {}
+        | Command::Step { .. }
+        | Command::Rate { .. }
+        | Command::Seek { .. }
+        | Command::Loop { .. } => false,
+        Command::Set { parameter, .. } => *parameter != Parameter::TimeScale.name(),
+        _ => true,
+    }
 }

@@ -81,11 +81,11 @@ mod tests {
     };
 
     const PLANAR: CommandContext<'_> =
-        CommandContext { epoch: 1, rate_hz: 60, is_planar: true, particles: &[] };
+        CommandContext { epoch: 1, rate_hz: 60, is_planar: true, is_replay: false, particles: &[] };
 
     /// A scene in three dimensions with 100 steps per second.
     fn solid(particles: &[ParticleState]) -> CommandContext<'_> {
-        CommandContext { epoch: 1, rate_hz: 100, is_planar: false, particles }
+        CommandContext { epoch: 1, rate_hz: 100, is_planar: false, is_replay: false, particles }
     }
 
     fn at(position: [f32; 3]) -> ParticleState {

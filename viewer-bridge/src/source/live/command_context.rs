@@ -11,5 +11,7 @@ pub(super) struct CommandContext<'a> {
     pub(super) rate_hz: u32,
     /// The scene has two dimensions.
     pub(super) is_planar: bool,
+    /// A recording plays on the node's services.
+    pub(super) is_replay: bool,
     pub(super) particles: &'a [ParticleState],
 }

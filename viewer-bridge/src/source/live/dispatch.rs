@@ -169,7 +169,7 @@ impl Dispatch {
         let command = self.remove_sent(outcome.command.sequence);
         let result = match Reason::from_number(outcome.reason) {
             _ if outcome.is_applied() => Ok(()),
-            Some(reason) => Err(reason.into()),
+            Some(reason) => Err(Refusal::of_action(reason, &outcome.command.action())),
             None => Err(Refusal::Unknown),
         };
         match outcome.command.action() {

@@ -174,6 +174,7 @@ impl Link {
                     epoch: shown.epoch(),
                     rate_hz: state.map_or(1, |state| state.load.header.rate_hz.max(1)),
                     is_planar: state.is_some_and(|state| state.load.summary.is_planar),
+                    is_replay: self.status.as_ref().is_some_and(NodeStatus::is_replay),
                     particles: state.map_or(&[], |state| state.particles),
                 };
                 if let Some(outcome) = self.dispatch.submit(client, id, command, context) {

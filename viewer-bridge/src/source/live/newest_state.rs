@@ -54,6 +54,7 @@ impl NewestState {
         match read_load(state.load) {
             Ok(load) => {
                 shown.begin_load(sinks, load.to_scene(state.header.step, state.particles));
+                sinks.publish(&Update::Topology(load.topology()));
                 self.load = Some(load);
             }
             Err(error) => {

@@ -38,6 +38,7 @@ impl Updates {
             | Update::Surface(..)
             | Update::Colliders(..)
             | Update::Tears(..)
+            | Update::Forces(..)
             | Update::Keyframe(..) => {}
         }
     }

@@ -103,6 +103,7 @@ impl<'a> Player<'a> {
         self.publish_timeline();
         self.publish_playback();
         self.shown.begin_load(self.sinks, scene);
+        self.sinks.publish(&Update::Topology(self.recording.load.topology()));
         self.publish_changes();
         while !self.sinks.is_shutting_down() {
             self.handle_requests(requests)?;

@@ -19,7 +19,7 @@ const TURN_PER_PIXEL = 0.008;
 /** Depth range of a planar scene, relative to its width. */
 const FLAT_DEPTH = 100;
 /** Fraction of the picture that a framed box fills. */
-const FRAME_FILL = 0.8;
+const FRAME_FILL = 0.86;
 
 /**
  * The axes of a scene. In 2-D, x always points right and z points at the viewer, so "-y" mirrors the
@@ -156,16 +156,20 @@ export class Camera {
     this.target = add(this.target, subtract(before, after));
   }
 
-  /** Fits a box into the picture, seen from the current direction. @param {import("./math.js").Box} box @param {number} aspect */
+  /** Fits a box into the picture, seen from the current direction: the corner that needs the greatest
+   * distance touches the margin. @param {import("./math.js").Box} box @param {number} aspect */
   frame(box, aspect) {
     const half = scale(subtract(box.max, box.min), 0.5);
     this.target = scale(add(box.min, box.max), 0.5);
     const radius = Math.max(length(half), 1e-6);
     this.sceneRadius = radius;
-    const { right, up } = this.basis();
-    const extent = (/** @type {Vec3} */ axis) => Math.abs(axis[0]) * half[0] + Math.abs(axis[1]) * half[1] + Math.abs(axis[2]) * half[2];
-    const needed = Math.max(extent(up), extent(right) / aspect, radius * 0.2) / FRAME_FILL;
-    const depth = this.isFlat ? 0 : extent(this.basis().back);
-    this.distance = needed / Math.tan(FIELD_OF_VIEW / 2) + depth;
+    const { right, up, back } = this.basis();
+    const slope = Math.tan(FIELD_OF_VIEW / 2) * FRAME_FILL;
+    this.distance = (radius * 0.2) / slope;
+    for (let corner = 0; corner < 8; corner++) {
+      const at = /** @type {Vec3} */ (half.map((size, axis) => ((corner >> axis) & 1 ? size : -size)));
+      const closer = this.isFlat ? 0 : dot(at, back);
+      this.distance = Math.max(this.distance, closer + Math.max(Math.abs(dot(at, up)), Math.abs(dot(at, right)) / aspect) / slope);
+    }
   }
 }

@@ -55,7 +55,11 @@ export function particlesWithin(points, viewProjection, viewport, at, radius) {
   return particles;
 }
 
-/** The CSS pixel of every particle, as x, y pairs; NaN behind the eye. @param {Points} points @param {Mat4} viewProjection @param {Viewport} viewport */
+/** Grain of the pixels of `projectAll`: with 24 bits, they are exact up to 16,384. */
+const PIXEL_GRAIN = 2 ** -10;
+const onGrid = (/** @type {number} */ pixel) => Math.round(pixel / PIXEL_GRAIN) * PIXEL_GRAIN;
+
+/** The CSS pixel of every particle, as x, y pairs, in multiples of PIXEL_GRAIN; NaN behind the eye. @param {Points} points @param {Mat4} viewProjection @param {Viewport} viewport */
 export function projectAll(points, viewProjection, viewport) {
   const m = frameToClip(viewProjection, points);
   const p = points.positions;
@@ -63,8 +67,8 @@ export function projectAll(points, viewProjection, viewport) {
   for (let i = 0, o = 0; i + 2 < p.length; i += 3, o += 2) {
     const x = p[i], y = p[i + 1], z = p[i + 2];
     const w = m[3] * x + m[7] * y + m[11] * z + m[15];
-    pixels[o] = w > 0 ? ((m[0] * x + m[4] * y + m[8] * z + m[12]) / w + 1) * 0.5 * viewport.width : NaN;
-    pixels[o + 1] = w > 0 ? (1 - (m[1] * x + m[5] * y + m[9] * z + m[13]) / w) * 0.5 * viewport.height : NaN;
+    pixels[o] = w > 0 ? onGrid(((m[0] * x + m[4] * y + m[8] * z + m[12]) / w + 1) * 0.5 * viewport.width) : NaN;
+    pixels[o + 1] = w > 0 ? onGrid((1 - (m[1] * x + m[5] * y + m[9] * z + m[13]) / w) * 0.5 * viewport.height) : NaN;
   }
   return pixels;
 }
@@ -72,41 +76,64 @@ export function projectAll(points, viewProjection, viewport) {
 /**
  * The constraints that a blade crosses: those that moved over its position between two frames, and
  * those that it then crosses along `path`.
+ *
+ * No constraint slips through, whatever the cloth does meanwhile. The particles move to their new places one
+ * after the other, in the order of their indices, so an end of a constraint sweeps a triangle. Then the blade
+ * moves. Each test is made of the sides of points to lines, which are the same for all constraints at
+ * a particle, and exact: products of differences of multiples of PIXEL_GRAIN fit into the numbers.
  * @param {Float32Array} pixels from projectAll @param {Float32Array} past the same for the frame before
  * @param {Uint32Array} ends @param {Uint8Array} isGone @param {Pixel[]} path starts at the position of the blade
  */
 export function crossedSticks(pixels, past, ends, isGone, path) {
   /** @type {number[]} */
   const crossed = [];
-  const at = path[0];
+  const [at, ...stops] = path.map(({ x, y }) => ({ x: onGrid(x), y: onGrid(y) }));
   for (let i = 0; i < isGone.length; i++) {
     if (isGone[i]) continue;
-    const a = 2 * ends[2 * i], b = 2 * ends[2 * i + 1];
-    const ax = pixels[a], ay = pixels[a + 1], bx = pixels[b], by = pixels[b + 1];
-    // Relative to the stick, the blade moved by the opposite of the motion of the stick's middle.
-    const x = at.x + (ax - past[a] + bx - past[b]) / 2;
-    const y = at.y + (ay - past[a + 1] + by - past[b + 1]) / 2;
-    if (crosses(ax, ay, bx, by, { x, y }, at) || path.some((to, k) => k > 0 && crosses(ax, ay, bx, by, path[k - 1], to))) crossed.push(i);
+    const a = 2 * Math.min(ends[2 * i], ends[2 * i + 1]), b = 2 * Math.max(ends[2 * i], ends[2 * i + 1]);
+    if (Number.isNaN(pixels[a] + pixels[b] + past[a] + past[b])) continue;
+    if (isSwept(pixels, past, a, b, at) || isCrossed(pixels, a, b, at, stops)) crossed.push(i);
   }
   return crossed;
 }
 
-/** segmentsCross behind a test of bounding boxes, which rules out most pairs. NaN passes the box test.
- * @param {number} ax @param {number} ay @param {number} bx @param {number} by @param {Pixel} from @param {Pixel} to */
-function crosses(ax, ay, bx, by, from, to) {
-  if ((ax < from.x && bx < from.x && ax < to.x && bx < to.x) || (ax > from.x && bx > from.x && ax > to.x && bx > to.x)) return false;
-  if ((ay < from.y && by < from.y && ay < to.y && by < to.y) || (ay > from.y && by > from.y && ay > to.y && by > to.y)) return false;
-  return segmentsCross(ax, ay, bx, by, from, to);
+/** True if a stick moves over a point: first its end a, then its end b. @param {Float32Array} pixels @param {Float32Array} past @param {number} a @param {number} b @param {Pixel} at */
+function isSwept(pixels, past, a, b, { x, y }) {
+  const ax = pixels[a], ay = pixels[a + 1], bx = pixels[b], by = pixels[b + 1];
+  const oldAx = past[a], oldAy = past[a + 1], oldBx = past[b], oldBy = past[b + 1];
+  if (Math.min(ax, bx, oldAx, oldBx) > x || Math.max(ax, bx, oldAx, oldBx) < x) return false;
+  if (Math.min(ay, by, oldAy, oldBy) > y || Math.max(ay, by, oldAy, oldBy) < y) return false;
+  const before = isLeft(oldAx, oldAy, oldBx, oldBy, x, y);
+  const between = isLeft(ax, ay, oldBx, oldBy, x, y);
+  const after = isLeft(ax, ay, bx, by, x, y);
+  return (before !== between && isLeft(oldAx, oldAy, ax, ay, x, y) === between) || (between !== after && isLeft(oldBx, oldBy, bx, by, x, y) === between);
 }
 
-/** True if two segments cross. A touch counts; parallel segments never cross.
+/** True if the blade crosses a stick on its way. @param {Float32Array} pixels @param {number} a @param {number} b @param {Pixel} at @param {Pixel[]} stops */
+function isCrossed(pixels, a, b, at, stops) {
+  const ax = pixels[a], ay = pixels[a + 1], bx = pixels[b], by = pixels[b + 1];
+  let from = at;
+  for (const to of stops) {
+    if (isBoxApart(ax, bx, from.x, to.x) || isBoxApart(ay, by, from.y, to.y)) {
+      from = to;
+      continue;
+    }
+    if (segmentsCross(ax, ay, bx, by, from, to)) return true;
+    from = to;
+  }
+  return false;
+}
+
+/** True if two intervals have no common point. @param {number} a @param {number} b @param {number} c @param {number} d */
+const isBoxApart = (a, b, c, d) => Math.max(a, b) < Math.min(c, d) || Math.min(a, b) > Math.max(c, d);
+
+/** True if a point lies left of the line from a to b; a point on the line counts as left.
+ * @param {number} ax @param {number} ay @param {number} bx @param {number} by @param {number} x @param {number} y */
+const isLeft = (ax, ay, bx, by, x, y) => (bx - ax) * (y - ay) >= (by - ay) * (x - ax);
+
+/** True if each of two segments has its ends on both sides of the other.
  * @param {number} ax @param {number} ay @param {number} bx @param {number} by @param {Pixel} from @param {Pixel} to */
 export function segmentsCross(ax, ay, bx, by, from, to) {
-  const sx = to.x - from.x, sy = to.y - from.y;
-  const tx = bx - ax, ty = by - ay;
-  const area = sx * ty - sy * tx;
-  if (area === 0) return false;
-  const along = ((ax - from.x) * ty - (ay - from.y) * tx) / area;
-  const across = ((ax - from.x) * sy - (ay - from.y) * sx) / area;
-  return along >= 0 && along <= 1 && across >= 0 && across <= 1;
+  return isLeft(from.x, from.y, to.x, to.y, ax, ay) !== isLeft(from.x, from.y, to.x, to.y, bx, by)
+    && isLeft(ax, ay, bx, by, from.x, from.y) !== isLeft(ax, ay, bx, by, to.x, to.y);
 }

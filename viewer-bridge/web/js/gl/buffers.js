@@ -30,7 +30,7 @@ export class Drawables {
 
   /** Empties all lists, and frees their memory. */
   clear() {
-    this.cloth.setTriangles(EMPTY);
+    this.cloth.setTriangles(EMPTY, EMPTY);
     this.sticks.clear();
     for (const list of [this.points.particles, this.points.marks, this.points.grabbed]) list.set(EMPTY);
   }
@@ -54,6 +54,8 @@ export class SceneBuffers {
     this.positions = new ArrayTexture(gl, 0, drawables.isQuantised ? formats.u16x3 : formats.f32x3, scene.particleCount);
     this.fanRanges = new ArrayTexture(gl, 1, formats.u32x2, scene.particleCount);
     this.fans = new ArrayTexture(gl, 2, formats.u32x4, scene.triangles.length);
+    /** Vertices of the pieces of split triangles; see SPLIT_WORDS. @type {ArrayTexture} */
+    this.splits = new ArrayTexture(gl, 3, formats.u32x4, 0);
     if (scene.particleCount > 0) this.fanRanges.write(topology.fanRanges);
     drawables.sticks.setSticks(scene, drawnSticks(scene, STICKS_MAX), topology.styles);
     this.writeTopology(true);
@@ -72,7 +74,11 @@ export class SceneBuffers {
     const { first, end } = isAll ? { first: 0, end: fans.count } : topology.dirtyFans.range();
     if (end > first) fans.write(topology.fans, first, end);
     topology.dirtyFans.clear();
-    drawables.cloth.setTriangles(topology.indices);
+    const { vertices, indices } = topology.pieces();
+    this.splits.delete();
+    this.splits = new ArrayTexture(this.gl, 3, layouts(this.gl).u32x4, vertices.length / 4);
+    this.splits.write(vertices);
+    drawables.cloth.setTriangles(topology.indices, indices);
     if (!isAll) drawables.sticks.setStyles(topology.styles);
   }
 
@@ -97,7 +103,7 @@ export class SceneBuffers {
   }
 
   delete() {
-    for (const texture of [this.positions, this.fanRanges, this.fans]) texture.delete();
+    for (const texture of [this.positions, this.fanRanges, this.fans, this.splits]) texture.delete();
     this.drawables.clear();
   }
 }

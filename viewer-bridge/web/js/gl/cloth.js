@@ -4,11 +4,29 @@
 import { Program } from "./context.js";
 import { HEADER, HEAT, LIGHT, SCREEN, SHADOW, positionReader } from "./shaders.js";
 
+/** Defines surface_position(vertex, particle): a vertex is a particle, or moves with one (state/splits.js). */
+const SURFACE_POSITION = `
+uniform usampler2D u_splits;
+uniform float u_particle_count;
+vec3 surface_position(uint vertex, out uint particle) {
+  particle = vertex;
+  uint count = uint(u_particle_count);
+  if (vertex < count) return position(vertex);
+  uint first = 2u * (vertex - count);
+  uvec4 corners = texelFetch(u_splits, texel(first), 0);
+  vec2 weights = uintBitsToFloat(texelFetch(u_splits, texel(first + 1u), 0).xy);
+  particle = corners.x;
+  vec3 at = position(particle);
+  return at + weights.x * (position(corners.y) - at) + weights.y * (position(corners.z) - at);
+}
+`;
+
 const NORMAL_FROM_FAN = `
 uniform usampler2D u_fan_ranges;
 uniform usampler2D u_fans;
 void main() {
-  uint particle = uint(gl_VertexID);
+  uint particle;
+  vec3 surface = surface_position(uint(gl_VertexID), particle);
   vec3 at = position(particle);
   uvec2 range = texelFetch(u_fan_ranges, texel(particle), 0).xy;
   vec3 normal = vec3(0.0);
@@ -21,10 +39,10 @@ void main() {
     float rest_length = uintBitsToFloat(fan.z);
     if (rest_length > 0.0) { strain += length(to_first) / rest_length - 1.0; edges += 1.0; }
   }
-  v_position = at;
+  v_position = surface;
   v_normal = normal;
   v_strain = strain / max(edges, 1.0);
-  gl_Position = u_view_projection * vec4(at, 1.0);
+  gl_Position = u_view_projection * vec4(surface, 1.0);
 }
 `;
 
@@ -34,7 +52,7 @@ uniform mat4 u_view_projection;
 out vec3 v_position;
 out vec3 v_normal;
 out float v_strain;
-${positionReader(isQuantised)}${NORMAL_FROM_FAN}`;
+${positionReader(isQuantised)}${SURFACE_POSITION}${NORMAL_FROM_FAN}`;
 
 const FRAGMENT = `${HEADER}${SCREEN}${LIGHT}${HEAT}
 in vec3 v_position;
@@ -66,9 +84,10 @@ void main() {
 const shadowVertex = (isQuantised) => `${HEADER}${SHADOW}
 uniform mat4 u_view_projection;
 out float v_height;
-${positionReader(isQuantised)}
+${positionReader(isQuantised)}${SURFACE_POSITION}
 void main() {
-  vec3 at = position(uint(gl_VertexID));
+  uint particle;
+  vec3 at = surface_position(uint(gl_VertexID), particle);
   v_height = dot(u_ground.xyz, at) - u_ground.w;
   gl_Position = u_view_projection * vec4(at, 1.0);
 }
@@ -88,20 +107,23 @@ export class Cloth {
     this.gl = gl;
     this.program = new Program(gl, vertex(isQuantised), FRAGMENT);
     this.shadow = new Program(gl, shadowVertex(isQuantised), SHADOW_FRAGMENT);
-    for (const program of [this.program, this.shadow]) program.setSamplers({ u_positions: 0, u_fan_ranges: 1, u_fans: 2 });
+    for (const program of [this.program, this.shadow]) program.setSamplers({ u_positions: 0, u_fan_ranges: 1, u_fans: 2, u_splits: 3 });
     this.vao = gl.createVertexArray();
     this.indices = gl.createBuffer();
     this.count = 0;
   }
 
-  /** @param {Uint32Array} triangles */
-  setTriangles(triangles) {
+  /** @param {Uint32Array} triangles @param {Uint32Array} pieces of split triangles */
+  setTriangles(triangles, pieces) {
     const { gl } = this;
     gl.bindVertexArray(this.vao);
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.indices);
-    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, triangles, gl.DYNAMIC_DRAW);
+    const all = new Uint32Array(triangles.length + pieces.length);
+    all.set(triangles);
+    all.set(pieces, triangles.length);
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, all, gl.DYNAMIC_DRAW);
     gl.bindVertexArray(null);
-    this.count = triangles.length;
+    this.count = all.length;
   }
 
   /** @param {Record<string, number | number[]>} uniforms */

@@ -190,7 +190,7 @@ export class Renderer {
       // A dark ball is invisible on the dark end of the heat map.
       u_particle: this.toggles.heat && this.toggles.surface && hasSurface ? palette.ring : palette.particle, u_ring: palette.ring, u_collider: palette.collider,
       u_marks: [...palette.pin, ...palette.anchor, ...palette.grabbed, ...palette.frozen],
-      u_round: 1, u_opacity: 1, u_forward: 0, u_shadow: 0, u_is_all: 1,
+      u_particle_count: simulation.scene?.particleCount ?? 0, u_round: 1, u_opacity: 1, u_forward: 0, u_shadow: 0, u_is_all: 1,
       u_ground: ground ? [...ground.normal, ground.offset] : [...up, -1e9],
       ...this.sizes(ratio, hasSurface, isFlat),
     };

@@ -42,6 +42,7 @@ export class Charts {
       total.push(now.kineticJ + now.potentialJ);
       this.draw();
     });
+    for (const topic of /** @type {const} */ (["node", "connection"])) simulation.on(topic, () => { if (!simulation.isAlive) this.clear(); });
     simulation.on("scene", () => this.charts.forEach((one) => one.lines.forEach((line) => line.series.clear())));
   }
 
@@ -49,6 +50,12 @@ export class Charts {
     if (this.charts[0].canvas.clientWidth === 0) return;
     for (const one of this.charts) drawChart(one);
     this.drawFigures();
+  }
+
+  /** Removes the numbers of a node that is gone. The plots end there. */
+  clear() {
+    for (const one of this.charts) one.output.textContent = "";
+    this.figures.replaceChildren();
   }
 
   drawFigures() {

@@ -1,9 +1,9 @@
 // The parameter panel: each row shows the value of the node and sends changes of the user. An older
 // answer never moves a slider while the user holds it.
 
-import { make } from "../ui/dom.js";
-import { SLIDER_STEPS, positionOf, rangeOf, rowsOf, valueAt, valueOf, vectorOf } from "./parameters.js";
-import { trim } from "../ui/format.js";
+import { find, make } from "../ui/dom.js";
+import { SLIDER_STEPS, editable, positionOf, rangeOf, restoring, rowsOf, valueAt, valueOf, vectorOf } from "./parameters.js";
+import { ValueField } from "./value-field.js";
 
 /** @typedef {import("./parameters.js").Row} Row */
 /** @typedef {import("../net/messages.js").ParameterValue} ParameterValue */
@@ -14,19 +14,26 @@ const AXES = ["x", "y", "z"];
 const WIND_DRAG = 0.6;
 
 export class Panel {
-  /** @param {HTMLFormElement} form @param {HTMLElement} note @param {import("../state/simulation.js").Simulation} simulation @param {import("../net/commands.js").Commands} commands */
-  constructor(form, note, simulation, commands) {
+  /** @param {HTMLFormElement} form @param {HTMLElement} note @param {import("../tools/tool.js").App} app @param {import("../ui/banner.js").Banner} banner */
+  constructor(form, note, { simulation, commands }, banner) {
     this.form = form;
     this.note = note;
     this.simulation = simulation;
     this.commands = commands;
-    /** Sends the newest unsent value of each parameter. @type {Map<string, () => void>} */
+    this.banner = banner;
+    this.resetButton = find("parameters-reset", HTMLButtonElement);
+    /** Sends the newest unsent value of each parameter and kind. @type {Map<string, () => void>} */
     this.unsent = new Map();
     /** @type {(() => void)[]} */
     this.refreshers = [];
     this.built = "";
     form.addEventListener("submit", (event) => event.preventDefault());
-    for (const topic of /** @type {const} */ (["hello", "node", "parameters", "scene"])) simulation.on(topic, () => this.update());
+    this.resetButton.addEventListener("click", () => this.reset());
+    for (const topic of /** @type {const} */ (["hello", "node", "parameters", "scene", "connection"])) simulation.on(topic, () => this.update());
+  }
+
+  rows() {
+    return rowsOf(this.simulation.node?.method ?? null);
   }
 
   /** Rebuilds the rows for another scene or method; otherwise refreshes their values. */
@@ -36,21 +43,39 @@ export class Panel {
     if (key !== this.built) {
       this.built = key;
       this.refreshers = [];
-      this.form.replaceChildren(...rowsOf(simulation.node?.method ?? null).map((row) => (row.kind === "vector" ? this.vectorRow(row) : this.numberRow(row))));
+      this.form.replaceChildren(...this.rows().map((row) => (row.kind === "vector" ? this.vectorRow(row) : this.numberRow(row))));
     }
     const reason = this.reasonAgainst();
     const note = `${reason} ${this.doubt()}`.trim();
     this.note.hidden = note === "";
     this.note.textContent = note;
     this.form.hidden = simulation.parameters?.values == null;
+    this.resetButton.hidden = this.form.hidden;
     for (const refresh of this.refreshers) refresh();
     for (const element of this.form.querySelectorAll("fieldset")) element.disabled = reason !== "";
+    const { changes, lost } = this.difference();
+    this.resetButton.disabled = reason !== "" || changes.length + lost.length === 0;
+  }
+
+  /** The parameters that differ from the values of the scene. */
+  difference() {
+    const { values, initial } = this.simulation.parameters ?? { values: null, initial: null };
+    return values === null || initial === null ? { changes: [], lost: [] } : restoring(this.rows(), values, initial, KINDS);
+  }
+
+  /** Restores the parameters of the scene, and leaves its particles as they are. */
+  reset() {
+    const { changes, lost } = this.difference();
+    for (const { name, value, kind } of changes) this.set(name, value, kind);
+    if (lost.length > 0) this.banner.notify(`${lost.join(", ")}: each constraint had its own value. Reset the scene to restore them.`, "warning");
   }
 
   /** The reason why nothing can be set now, or "". */
   reasonAgainst() {
     const { simulation } = this;
-    if (simulation.isReplay || simulation.node?.is_replay) return "The parameters of a recording cannot be changed.";
+    if (!simulation.isConnected) return "There is no connection to the bridge.";
+    if (simulation.isRecording) return "The parameters of a recording cannot be changed.";
+    if (!simulation.isAlive) return "No node is running.";
     if (simulation.parameters?.values == null) return "No scene is loaded.";
     return "";
   }
@@ -71,7 +96,7 @@ export class Panel {
   /** @param {string} name @param {ParameterValue} value @param {string} [kind] */
   set(name, value, kind) {
     const forKind = kind === undefined || kind === "all" ? {} : { constraint_kind: kind };
-    this.unsent.set(name, () => this.commands.run("set", { parameter: name, value, ...forKind }, (outcome) => {
+    this.unsent.set(`${name} ${kind ?? "all"}`, () => this.commands.run("set", { parameter: name, value, ...forKind }, (outcome) => {
       if (outcome.status !== "applied") this.update();
     }));
   }
@@ -85,43 +110,59 @@ export class Panel {
     return button;
   }
 
-  /** A row with three sliders; a planar scene uses two. @param {Row} row */
+  /** @param {Row} row @param {string} label @param {(value: number | null) => void} onValue */
+  valueField(row, label, onValue) {
+    return new ValueField(row, label, onValue, (text) => {
+      const allowed = row.kind === "whole" ? "a whole number" : row.canBeOff ? "a number or off" : "a number";
+      this.banner.notify(`${row.label}: “${text}” is not ${allowed}.`, "warning");
+    });
+  }
+
+  /** Tells screen readers the value of a slider, instead of its position. @param {HTMLInputElement} slider @param {Row} row @param {ParameterValue} value */
+  describe(slider, row, value) {
+    slider.setAttribute("aria-valuetext", `${editable(value)} ${this.unit(row)}`.trim());
+  }
+
+  /** A row with three sliders and values; a planar scene uses two. @param {Row} row */
   vectorRow(row) {
     const { simulation } = this;
-    const output = make("output");
     const read = () => vectorOf(valueOf(simulation.parameters?.values ?? null, row.name, "structural"));
     const initial = () => vectorOf(valueOf(simulation.parameters?.initial ?? null, row.name, "structural"));
     const button = this.undoButton(row, () => this.set(row.name, initial()));
     const range = () => rangeOf(row, ...read(), ...initial());
     const sliders = AXES.map((axis) => make("input", { type: "range", min: 0, max: SLIDER_STEPS, "aria-label": `${row.label} ${axis}` }));
-    const shown = () => /** @type {[number, number, number]} */ (sliders.map((slider) => valueAt(row, range(), slider.valueAsNumber)));
-    const showValue = (/** @type {number[]} */ vector) => { output.textContent = `${vector.map(trim).join(", ")} ${this.unit(row)}`; };
-    sliders.forEach((slider, axis) => slider.addEventListener("input", () => {
-      // The other axes keep their exact values.
+    // The other axes keep their exact values.
+    const setAxis = (/** @type {number} */ axis, /** @type {number | null} */ value) => {
       const vector = read();
-      vector[axis] = shown()[axis];
-      showValue(vector);
+      vector[axis] = value ?? 0;
       this.set(row.name, vector);
       if (row.name === "wind_velocity" && !valueOf(simulation.parameters?.values ?? null, "wind_drag", "")) this.set("wind_drag", WIND_DRAG);
+    };
+    const fields = AXES.map((axis, index) => this.valueField(row, `${row.label} ${axis} in ${this.unit(row)}`, (value) => setAxis(index, value)));
+    sliders.forEach((slider, axis) => slider.addEventListener("input", () => {
+      const value = valueAt(row, range(), slider.valueAsNumber);
+      fields[axis].show(value);
+      this.describe(slider, row, value);
+      setAxis(axis, value);
     }));
-    const axes = make("div", { class: "axes all" }, ...sliders.map((slider, axis) => make("label", {}, AXES[axis], slider)));
-    const shell = make("fieldset", { class: "row" }, make("span", { class: "title wide" }, row.label), output, button, axes);
+    const axes = make("div", { class: "axes all" }, ...AXES.map((axis, index) => make("div", {}, make("span", { "aria-hidden": "true" }, axis), fields[index].input, sliders[index])));
+    const shell = make("fieldset", { class: "row" }, make("span", { class: "title wide" }, row.label), make("span", { class: "unit" }, this.unit(row)), button, axes);
     this.refreshers.push(() => {
       const vector = read();
       sliders.forEach((slider, axis) => {
         if (!slider.matches(":active")) slider.valueAsNumber = positionOf(row, range(), vector[axis]);
-        slider.disabled = axis === 2 && (simulation.scene?.isPlanar ?? false);
+        this.describe(slider, row, vector[axis]);
+        fields[axis].show(vector[axis]);
+        slider.disabled = fields[axis].input.disabled = axis === 2 && (simulation.scene?.isPlanar ?? false);
       });
-      showValue(vector);
       button.classList.toggle("is-idle", String(vector) === String(initial()));
     });
     return shell;
   }
 
-  /** A row with one slider, a switch if the parameter can be off, and a choice of the constraint kind if it is per kind. @param {Row} row */
+  /** A row with a slider and its value, a switch if the parameter can be off, and a choice of the constraint kind if it is per kind. @param {Row} row */
   numberRow(row) {
     const { simulation } = this;
-    const output = make("output");
     const slider = make("input", { type: "range", min: 0, max: SLIDER_STEPS, id: `set-${row.name}` });
     const kinds = make("select", { "aria-label": `${row.label}: constraint kind` }, ...["all", ...KINDS].map((kind) => make("option", {}, kind)));
     const isOn = make("input", { type: "checkbox", "aria-label": `${row.label}: on` });
@@ -130,13 +171,18 @@ export class Panel {
     const numbers = () => [read("values"), read("initial")].filter((value) => typeof value === "number");
     const range = () => rangeOf(row, .../** @type {number[]} */ (numbers()));
     const send = (/** @type {ParameterValue} */ value) => this.set(row.name, value, row.perKind ? kind() : undefined);
+    const field = this.valueField(row, `${row.label}${row.unit === "" ? "" : ` in ${this.unit(row)}`}`, send);
     const button = this.undoButton(row, () => send(read("initial")));
     const title = make("span", { class: "title" }, ...(row.canBeOff ? [isOn] : []), make("label", { for: slider.id }, row.label));
-    const shell = make("fieldset", { class: "row" }, title, slider, output, button);
-    if (row.perKind) slider.before(kinds);
-    if (row.perKind) shell.append(slider);
+    const unit = make("span", { class: "unit" }, this.unit(row));
+    const shell = make("fieldset", { class: "row" }, title, row.perKind ? kinds : slider, field.input, unit, button, ...(row.perKind ? [slider] : []));
     slider.classList.toggle("all", row.perKind ?? false);
-    const showValue = (/** @type {ParameterValue} */ value) => { output.textContent = typeof value === "number" && !(row.canBeOff && value === 0 && row.least === 0) ? `${trim(value)} ${this.unit(row)}` : row.perKind ? "own" : "off"; };
+    const showValue = (/** @type {ParameterValue} */ value) => {
+      const isOff = typeof value !== "number" || (row.canBeOff && value === 0 && row.least === 0);
+      // Each constraint can have its own value.
+      field.show(isOff ? null : value, row.perKind ? "own" : "off");
+      this.describe(slider, row, isOff ? null : value);
+    };
     slider.addEventListener("input", () => {
       const value = valueAt(row, range(), slider.valueAsNumber);
       isOn.checked = true;

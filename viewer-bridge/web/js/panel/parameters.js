@@ -33,7 +33,7 @@ export const ROWS = [
   { name: "tear_distance", label: "Tear distance", unit: "m", kind: "log", least: 1e-3, most: 100, canBeOff: true, whenOn: 0.1 },
   { name: "contact", label: "Contact distance", unit: "m", kind: "log", least: 1e-3, most: 1, canBeOff: true, whenOn: 0.02 },
   { name: "contact_friction", label: "Contact friction", unit: "", kind: "linear", least: 0, most: 2 },
-  { name: "time_scale", label: "Pace", unit: "×", kind: "log", least: 0.01, most: 10 },
+  { name: "time_scale", label: "Speed", unit: "×", kind: "log", least: 0.01, most: 10 },
 ];
 
 /** The rows for a method. @param {string | null} method */
@@ -81,4 +81,41 @@ export function valueOf(values, name, kind) {
   const value = values?.[name] ?? null;
   if (value === null || typeof value !== "object" || Array.isArray(value)) return typeof value === "string" ? toNumber(value) : value;
   return value[kind] ?? null;
+}
+
+/** A value as text that can be edited: all digits of a 32-bit number, and "off" for none. @param {ParameterValue} value */
+export function editable(value) {
+  return typeof value === "number" ? String(Number(value.toPrecision(6))) : "off";
+}
+
+/** The value that a user typed for a row: a number, or null for "off". Undefined if it is neither.
+ * @param {Row} row @param {string} text @returns {number | null | undefined} */
+export function typedValue(row, text) {
+  const word = text.trim().toLowerCase();
+  if (word === "off") return row.canBeOff ? null : undefined;
+  // A comma separates decimals in many countries; thousands are never separated.
+  const value = Number(word.replace(",", "."));
+  if (word === "" || !Number.isFinite(value)) return undefined;
+  return row.kind === "whole" && !Number.isInteger(value) ? undefined : value;
+}
+
+/**
+ * The commands that restore the parameters of the scene, and the labels of rows that no command restores:
+ * "set" cannot give each constraint its own value back.
+ * @param {Row[]} rows @param {Values} values @param {Values} initial @param {string[]} kinds of constraints
+ */
+export function restoring(rows, values, initial, kinds) {
+  /** @type {{ name: string, value: ParameterValue, kind?: string }[]} */
+  const changes = [];
+  /** @type {string[]} */
+  const lost = [];
+  for (const row of rows) {
+    for (const kind of row.perKind ? kinds : [undefined]) {
+      const [now, first] = [values, initial].map((one) => valueOf(one, row.name, kind ?? ""));
+      if (String(now) === String(first)) continue;
+      if (first === null && row.perKind) lost.push(row.label);
+      else changes.push({ name: row.name, value: first, ...(kind === undefined ? {} : { kind }) });
+    }
+  }
+  return { changes, lost: [...new Set(lost)] };
 }

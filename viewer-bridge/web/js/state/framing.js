@@ -1,6 +1,6 @@
 // The box that the first view of a scene shows: the scene, and the space that it will move into.
 
-import { add, addScaled, dot, length, scale, subtract } from "../geometry/math.js";
+import { add, addScaled, boxOf, dot, length, scale, subtract } from "../geometry/math.js";
 import { PIN } from "../net/wire.js";
 
 /** @typedef {import("../geometry/math.js").Vec3} Vec3 */
@@ -21,11 +21,11 @@ export function firstViewBox(simulation) {
   const bounds = simulation.colliders.find((one) => one.shape === "bounds");
   if (bounds) return { min: bounds.a, max: bounds.b };
   const { up } = simulation.axes();
-  const box = simulation.box();
+  const box = heldBox(simulation);
   if (length(subtract(box.max, box.min)) === 0) grow(box, POINT_ROOM);
   const size = length(subtract(box.max, box.min));
   const middle = scale(add(box.min, box.max), 0.5);
-  const floor = simulation.ground ?? simulation.floor();
+  const floor = simulation.ground ?? simulation.floor() ?? (simulation.lowest === null ? null : { normal: up, offset: simulation.lowest });
   if (floor !== null) {
     const drop = dot(floor.normal, middle) - floor.offset;
     if (drop > 0 && drop < FLOOR_SIZES * size) include(box, addScaled(middle, up, -drop));
@@ -37,6 +37,42 @@ export function firstViewBox(simulation) {
   if ([...simulation.pins.values()].some((flags) => (flags & PIN.anchored) !== 0)) grow(box, CARRIED_ROOM * size);
   for (const one of simulation.colliders) includeSolid(box, boundingSphere(one, simulation.scene?.meshes.get(one.index)), middle, size);
   return box;
+}
+
+/** The box of the particles that still belong to the scene: those that something holds, or the largest part
+ * if nothing is held. Parts that were cut off and have fallen away are no part of the picture.
+ * @param {import("./simulation.js").Simulation} simulation @returns {Box} */
+export function heldBox(simulation) {
+  const { scene, topology, torn, pins } = simulation;
+  if (scene === null || topology === null || torn.length === 0) return simulation.box();
+  const parts = partsOf(scene, topology.isGone);
+  const held = new Set([...pins.keys()].map((particle) => parts[particle]));
+  if (held.size === 0) held.add(largestOf(parts));
+  /** @type {number[]} */
+  const positions = [];
+  for (let p = 0; p < scene.particleCount; p++) {
+    const at = held.has(parts[p]) ? simulation.position(p) : null;
+    if (at !== null && at.every(Number.isFinite)) positions.push(...at);
+  }
+  return positions.length === 0 ? simulation.box() : boxOf(positions);
+}
+
+/** For each particle, a particle that stands for all that intact constraints connect with it. @param {import("../net/wire.js").Scene} scene @param {Uint8Array} isGone */
+function partsOf({ particleCount, ends }, isGone) {
+  const parts = Uint32Array.from({ length: particleCount }, (_, p) => p);
+  const root = (/** @type {number} */ p) => {
+    while (parts[p] !== p) p = parts[p] = parts[parts[p]];
+    return p;
+  };
+  for (let i = 0; i < isGone.length; i++) if (!isGone[i]) parts[root(ends[2 * i])] = root(ends[2 * i + 1]);
+  return parts.map((_, p) => root(p));
+}
+
+/** @param {Uint32Array} parts */
+function largestOf(parts) {
+  const counts = new Map();
+  for (const part of parts) counts.set(part, (counts.get(part) ?? 0) + 1);
+  return [...counts].reduce((best, one) => (one[1] > best[1] ? one : best))[0];
 }
 
 /** Includes a solid that is close enough, and no bigger than the scene. @param {Box} box @param {[Vec3, number]} sphere @param {Vec3} middle @param {number} size */

@@ -1,4 +1,4 @@
-// The lowest height that a scene can hang to: the ground is drawn below it, so that nothing sinks in.
+// The lowest height that a scene can hang to: the first view has room for it.
 
 /** @typedef {import("../geometry/math.js").Vec3} Vec3 */
 /** @typedef {import("../net/wire.js").Scene} Scene */

@@ -23,8 +23,6 @@ import { add, boxOf, dot, length, scale, subtract } from "../geometry/math.js";
 /** @typedef {import("../net/messages.js").TextMessage} TextMessage */
 /** A floor: normal · x = offset. @typedef {{ normal: Vec3, offset: number }} Plane */
 
-/** Gap between the lowest point that can be reached and the ground, in radii of the scene. */
-const GROUND_GAP = 0.06;
 /** Least cosine between the normal of a floor and the up axis. */
 const FLOOR_COSINE = 0.99;
 
@@ -32,8 +30,8 @@ const FLOOR_COSINE = 0.99;
  * @typedef {{
  *   scene: Scene, frame: Frame, tear: void, pins: void, colliders: Collider[], stats: Stats,
  *   hello: Hello, node: NodeState, parameters: Parameters, timeline: TimelineMessage | null, playback: Playback | null,
- *   outcome: import("../net/messages.js").OutcomeMessage, reset: void,
- *   notice: { level: string, text: string }, ground: void,
+ *   outcome: import("../net/messages.js").OutcomeMessage, reset: number,
+ *   notice: { level: string, text: string }, ground: void, connection: boolean,
  * }} Topics
  */
 
@@ -72,9 +70,30 @@ export class Simulation extends Emitter {
     this.timeline = null;
     /** @type {Playback | null} */
     this.playback = null;
-    /** @type {Plane | null} */
+    /** The floor of the scene, which is drawn because it holds. @type {Plane | null} */
     this.ground = null;
+    /** The lowest height that the scene can hang to; null if it falls. @type {number | null} */
+    this.lowest = null;
     this.groundIsSettled = false;
+    /** The bridge has accepted the page, and the connection is open. */
+    this.isConnected = false;
+  }
+
+  /** @param {boolean} isConnected */
+  setConnected(isConnected) {
+    if (isConnected === this.isConnected) return;
+    this.isConnected = isConnected;
+    this.emit("connection", isConnected);
+  }
+
+  /** True if the picture is of the present: the bridge answers, and its node or recording is there. */
+  get isAlive() {
+    return this.isConnected && (this.isReplay || this.node?.state === "alive");
+  }
+
+  /** True if the picture is of a recording, which cannot be changed. */
+  get isRecording() {
+    return this.isReplay || (this.node?.is_replay ?? false);
   }
 
   get isReplay() {
@@ -112,6 +131,7 @@ export class Simulation extends Emitter {
     this.colliders = [];
     this.nonFinite = [];
     this.ground = null;
+    this.lowest = null;
     this.groundIsSettled = false;
     this.emit("scene", scene);
     this.emit("pins", undefined);
@@ -165,15 +185,11 @@ export class Simulation extends Emitter {
     if (!hadColliders) this.settleGround();
   }
 
-  /** Chooses the ground: a floor among the colliders, else a little below the lowest point that can be reached, else none. */
+  /** Finds the floor among the colliders, and how far the scene can hang. */
   settleGround() {
     if (this.scene === null || this.scene.isPlanar) return;
-    const { up } = this.axes();
     this.ground = this.floor();
-    if (this.ground === null) {
-      const lowest = lowestReach(this.scene, [...this.pins.keys()], up);
-      this.ground = lowest === null ? null : { normal: up, offset: lowest - this.radius() * GROUND_GAP };
-    }
+    this.lowest = lowestReach(this.scene, [...this.pins.keys()], this.axes().up);
     this.groundIsSettled = true;
     this.emit("ground", undefined);
   }
@@ -231,11 +247,11 @@ export class Simulation extends Emitter {
 
   /** Reverts expected pins and cuts. If the reset undid them before the bridge published them, no later
    * message corrects the page. */
-  receiveReset() {
+  receiveReset(step = 0) {
     this.pins = new Map(this.pinsReceived);
     this.emit("pins", undefined);
     this.rebuild();
-    this.emit("reset", undefined);
+    this.emit("reset", step);
   }
 
   /** @param {number} particle @returns {Vec3 | null} */
@@ -265,7 +281,7 @@ export class Simulation extends Emitter {
       case "timeline": this.timeline = message; return this.emit("timeline", message);
       case "playback": this.playback = message; return this.emit("playback", message);
       case "outcome": return this.emit("outcome", message);
-      case "reset": return this.receiveReset();
+      case "reset": return this.receiveReset(message.step);
       case "notice": return this.emit("notice", message);
       default: // The number of pages, which STATS has as well, or a message of a later bridge.
     }

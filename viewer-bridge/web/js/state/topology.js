@@ -2,6 +2,7 @@
 // and the fan of triangles around each particle that gives its normal.
 
 import { CONSTRAINT } from "../net/wire.js";
+import { floatBits, nextCorner, splitPieces } from "./splits.js";
 
 /** @typedef {import("../net/wire.js").Scene} Scene */
 
@@ -31,7 +32,11 @@ export class Topology {
     this.fans = fans.entries;
     /** Index of the entry of each corner: 3 t. */
     this.fanEntries = fans.entryByCorner;
+    this.cornerByEntry = fans.cornerByEntry;
+    /** Triangles that are not drawn as a whole: gone, or in pieces. */
     this.isDead = new Uint8Array(scene.triangleCount);
+    /** Triangles with a torn edge, which are drawn in pieces. @type {Set<number>} */
+    this.split = new Set();
     /** Corners of the triangles. Those of dead triangles are all 0: a triangle without area draws nothing. */
     this.indices = new Uint32Array(scene.triangles.length);
     /** Fan entries not uploaded yet. */
@@ -44,6 +49,7 @@ export class Topology {
   /** Restores every constraint and triangle. */
   restore() {
     this.isDead.fill(0);
+    this.split.clear();
     this.isGone.fill(0);
     for (let i = 0; i < this.styles.length; i++) {
       const isCovered = this.edgeCorners.starts[i + 1] > this.edgeCorners.starts[i];
@@ -53,7 +59,7 @@ export class Topology {
     this.indices.set(this.scene.triangles);
   }
 
-  /** Removes constraints, and the triangles along structural ones. @param {ArrayLike<number>} constraints */
+  /** Removes constraints, and splits the triangles along structural ones. @param {ArrayLike<number>} constraints */
   remove(constraints) {
     for (let k = 0; k < constraints.length; k++) {
       const i = constraints[k];
@@ -62,8 +68,10 @@ export class Topology {
       this.styles[i] |= STICK.isGone;
       const isStructural = this.scene.constraintKinds[i] === CONSTRAINT.structural;
       for (const corner of this.edgeCorners.at(i)) {
-        if (isStructural) this.kill(triangleOf(corner));
-        else this.writeRestLength(corner);
+        if (isStructural) {
+          this.kill(triangleOf(corner));
+          this.split.add(triangleOf(corner));
+        } else this.writeRestLength(corner);
       }
     }
   }
@@ -78,8 +86,46 @@ export class Topology {
     for (let i = 0; i < ends.length / 2; i++) if (lost.has(ends[2 * i]) || lost.has(ends[2 * i + 1])) constraints.push(i);
     this.remove(constraints);
     for (let t = 0; t < triangles.length / 3; t++) {
-      if (lost.has(triangles[3 * t]) || lost.has(triangles[3 * t + 1]) || lost.has(triangles[3 * t + 2])) this.kill(t);
+      if (!lost.has(triangles[3 * t]) && !lost.has(triangles[3 * t + 1]) && !lost.has(triangles[3 * t + 2])) continue;
+      this.kill(t);
+      this.split.delete(t);
     }
+  }
+
+  /** The vertices and indices of the pieces of split triangles, as `splitPieces` returns them. */
+  pieces() {
+    const { triangles, particleCount } = this.scene;
+    const cornersAt = (/** @type {number} */ particle) => this.cornerByEntry.subarray(this.fanRanges[2 * particle], this.fanRanges[2 * particle] + this.fanRanges[2 * particle + 1]);
+    const isTorn = (/** @type {number} */ corner) => this.isTornEdge(corner, cornersAt);
+    const restLength = (/** @type {number} */ corner) => this.restLength(corner);
+    return splitPieces({ triangles, cornersAt, isTorn, restLength }, this.split, particleCount);
+  }
+
+  /** True if the edge from a corner to the next is torn. An edge without constraints holds as long as a
+   * triangle beside it does. @param {number} corner @param {(particle: number) => Uint32Array} cornersAt */
+  isTornEdge(corner, cornersAt) {
+    const { triangles } = this.scene;
+    if (this.edgeConstraints.at(corner).length > 0) return this.isTornConstraint(corner);
+    const [a, b] = [triangles[corner], triangles[nextCorner(corner)]];
+    const beside = [corner, ...[a, b].flatMap((one) => [...cornersAt(one)].filter((other) => other !== corner && isBetween(triangles, other, a, b)))];
+    return beside.every((one) => [nextCorner(one), nextCorner(nextCorner(one))].some((other) => this.isTornConstraint(other)));
+  }
+
+  /** True if a structural constraint along an edge is gone, or all others where there is none. @param {number} corner */
+  isTornConstraint(corner) {
+    const { constraintKinds } = this.scene;
+    const members = this.edgeConstraints.at(corner);
+    const structural = members.filter((one) => constraintKinds[one] === CONSTRAINT.structural);
+    return structural.length > 0 ? structural.some((one) => this.isGone[one] === 1) : members.length > 0 && members.every((one) => this.isGone[one] === 1);
+  }
+
+  /** Rest length of an edge, or its length in the scene without a constraint. @param {number} corner */
+  restLength(corner) {
+    const { triangles, positions: p, restLengths } = this.scene;
+    const members = this.edgeConstraints.at(corner);
+    if (members.length > 0) return restLengths[members[0]];
+    const [a, b] = [3 * triangles[corner], 3 * triangles[nextCorner(corner)]];
+    return Math.hypot(p[a] - p[b], p[a + 1] - p[b + 1], p[a + 2] - p[b + 2]);
   }
 
   /** @param {number} triangle */
@@ -127,8 +173,11 @@ export class Topology {
 
 /** @param {number} corner */
 const triangleOf = (corner) => Math.floor(corner / 3);
-/** The next corner of the same triangle. @param {number} corner */
-const nextCorner = (corner) => corner - (corner % 3) + ((corner + 1) % 3);
+/** True if the edge of a corner lies between two particles. @param {ArrayLike<number>} triangles @param {number} corner @param {number} a @param {number} b */
+const isBetween = (triangles, corner, a, b) => {
+  const [from, to] = [triangles[corner], triangles[nextCorner(corner)]];
+  return (from === a && to === b) || (from === b && to === a);
+};
 
 /** Lists of numbers, concatenated. */
 class Lists {
@@ -181,14 +230,6 @@ class DirtyRange {
   }
 }
 
-const scratch = new DataView(new ArrayBuffer(4));
-
-/** @param {number} value */
-function floatBits(value) {
-  scratch.setFloat32(0, value);
-  return scratch.getUint32(0);
-}
-
 /** The constraints along the edge from each corner of each triangle to the next. Structural ones come first, then by index.
  * @param {Scene} scene */
 function edgeConstraints(scene) {
@@ -226,10 +267,13 @@ function buildFans(scene) {
   for (let p = 1; p < particleCount; p++) ranges[2 * p] = ranges[2 * p - 2] + ranges[2 * p - 1];
   const used = new Uint32Array(particleCount);
   const entryByCorner = new Uint32Array(triangles.length);
+  const cornerByEntry = new Uint32Array(triangles.length);
   triangles.forEach((particle, corner) => {
-    entryByCorner[corner] = ranges[2 * particle] + used[particle]++;
+    const entry = ranges[2 * particle] + used[particle]++;
+    entryByCorner[corner] = entry;
+    cornerByEntry[entry] = corner;
   });
-  return { ranges, entryByCorner, entries: new Uint32Array(triangles.length * FAN_WORDS) };
+  return { ranges, entryByCorner, cornerByEntry, entries: new Uint32Array(triangles.length * FAN_WORDS) };
 }
 
 /**

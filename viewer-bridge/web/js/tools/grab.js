@@ -40,7 +40,11 @@ export class GrabTool {
 
   /** @param {number} nowMs */
   tick(nowMs) {
-    if (!this.isMoved) return;
+    if (!this.isMoved) {
+      // The next motion begins now. Spread over the rest before it, it would lag behind the pointer.
+      this.sentMs = nowMs;
+      return;
+    }
     const over_s = clamp((nowMs - this.sentMs) / 1000, OVER_S.min, OVER_S.max);
     this.app.commands.stream("move", { particle: this.particle, target: this.targetAt(this.pointer), over_s });
     this.sentMs = nowMs;

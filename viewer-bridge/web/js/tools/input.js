@@ -43,6 +43,8 @@ export class Input {
     this.hovered = null;
     this.isHoverStale = false;
     this.longPress = 0;
+    /** Called when a tool begins to change the simulation. */
+    this.onTouch = () => {};
     this.listen();
   }
 
@@ -80,6 +82,7 @@ export class Input {
       return;
     }
     this.tool = this.begin(event, at);
+    if (!(this.tool instanceof ViewTool)) this.onTouch();
     if (event.pointerType === "touch" && this.tool instanceof GrabTool) this.waitForLongPress(this.tool);
     this.app.renderer.isDirty = true;
   }

@@ -1,8 +1,9 @@
 // The top bar: buttons, scene picker and help, with their keyboard shortcuts.
 
-import { find, make } from "./dom.js";
+import { find } from "./dom.js";
 import { MODES } from "../tools/input.js";
-import { listenToKeys } from "./keys.js";
+import { listenToKeys, returnFocus } from "./keys.js";
+import { SceneMenu, neighbour } from "./scene-menu.js";
 
 /** @typedef {import("../tools/input.js").Mode} Mode */
 
@@ -27,21 +28,27 @@ export class Controls {
     this.pause = find("pause", HTMLButtonElement);
     this.step = find("step", HTMLButtonElement);
     this.reset = find("reset", HTMLButtonElement);
-    this.scene = find("scene", HTMLSelectElement);
+    this.scene = find("scene", HTMLButtonElement);
+    this.sceneName = find("scene-name", HTMLElement);
+    this.menu = new SceneMenu((scene) => this.load(scene));
     this.help = find("help-dialog", HTMLDialogElement);
     this.modes = [...find("modes", HTMLElement).querySelectorAll("button")];
     this.panelToggle = find("panel-toggle", HTMLButtonElement);
     this.listen();
     listenToKeys(this.keymap());
+    returnFocus(input.canvas);
     const { simulation } = app;
-    for (const topic of /** @type {const} */ (["hello", "node", "playback", "scene", "parameters"])) simulation.on(topic, () => this.show());
+    /** The scene that is being loaded, for quick presses of a key. @type {string | null} */
+    this.requested = null;
+    for (const topic of /** @type {const} */ (["scene", "connection"])) simulation.on(topic, () => { this.requested = null; });
+    for (const topic of /** @type {const} */ (["hello", "node", "playback", "scene", "parameters", "connection"])) simulation.on(topic, () => this.show());
   }
 
   listen() {
     this.pause.addEventListener("click", () => this.togglePause());
     this.step.addEventListener("click", () => this.stepOnce(1));
     this.reset.addEventListener("click", () => this.app.commands.run("reset"));
-    this.scene.addEventListener("change", () => this.load(this.scene.value));
+    this.scene.addEventListener("click", () => this.openMenu());
     for (const button of this.modes) button.addEventListener("click", () => this.setMode(/** @type {Mode} */ (button.dataset.mode)));
     find("frame", HTMLButtonElement).addEventListener("click", () => this.views.frame());
     find("picture", HTMLButtonElement).addEventListener("click", () => this.views.savePicture());
@@ -65,12 +72,15 @@ export class Controls {
       s: () => views.savePicture(),
       v: () => this.togglePanel(),
       h: () => views.toggle("heat"),
-      l: () => views.toggle("sticks"),
+      e: () => views.toggle("sticks"),
       k: () => views.toggle("particles"),
       g: () => this.setMode("grab"),
       b: () => this.setMode("brush"),
       c: () => this.setMode("cut"),
       p: () => { if (!this.input.pinHovered()) this.setMode("pin"); },
+      m: () => this.openMenu(),
+      "[": () => this.loadNeighbour(-1),
+      "]": () => this.loadNeighbour(1),
       "?": () => this.help.showModal(),
       "+": () => this.zoom(KEY_ZOOM),
       "=": () => this.zoom(KEY_ZOOM),
@@ -116,14 +126,33 @@ export class Controls {
 
   /** @param {string} scene */
   load(scene) {
-    this.app.commands.run("load", { scene }, (outcome) => {
-      if (outcome.status !== "applied") this.show();
-    });
+    this.requested = scene;
+    this.app.commands.run("load", { scene }, ({ status }) => { if (status !== "applied") this.requested = null; });
+  }
+
+  /** The name of the scene on show. */
+  name() {
+    const { node, scene, timeline } = this.app.simulation;
+    return scene?.name || (node?.scene ?? timeline?.scene ?? null);
+  }
+
+  scenes() {
+    return this.app.simulation.hello?.scenes ?? [];
+  }
+
+  openMenu() {
+    if (!this.scene.disabled) this.menu.open(this.scenes(), this.name());
   }
 
   /** @param {number} index */
   loadNumber(index) {
-    const scene = this.app.simulation.hello?.scenes[index];
+    const scene = this.scenes()[index];
+    if (scene !== undefined && !this.scene.disabled) this.load(scene.name);
+  }
+
+  /** Loads the scene before or after the present one in the list. @param {number} by */
+  loadNeighbour(by) {
+    const scene = neighbour(this.scenes(), this.requested ?? this.name(), by);
     if (scene !== undefined && !this.scene.disabled) this.load(scene.name);
   }
 
@@ -143,42 +172,25 @@ export class Controls {
 
   canChange() {
     const { simulation } = this.app;
-    return !simulation.isReplay && !(simulation.node?.is_replay ?? false) && simulation.node?.state === "alive";
+    return simulation.isAlive && !simulation.isRecording;
   }
 
   /** Updates the controls. The tooltip of a disabled control gives the reason. */
   show() {
     const { simulation } = this.app;
-    const isAlive = simulation.node?.state === "alive" || simulation.isReplay;
-    const isRecording = simulation.isReplay || (simulation.node?.is_replay ?? false);
+    const gone = simulation.isAlive ? "" : simulation.isConnected ? "No node is running." : "There is no connection to the bridge.";
+    const recorded = (/** @type {string} */ reason) => gone || (simulation.isRecording ? reason : "");
     this.pause.setAttribute("aria-pressed", String(simulation.isPaused));
     setText(this.pause, simulation.isPaused ? "Resume" : "Pause");
-    enable(this.pause, isAlive, "No node is running.");
-    enable(this.step, isAlive, "No node is running.");
-    enable(this.reset, isAlive && !isRecording, isRecording ? "A recording cannot be reset. Use the timeline to go back." : "No node is running.");
-    for (const button of this.modes) enable(button, isAlive && !isRecording, isRecording ? "A recording cannot be changed." : "No node is running.");
-    this.showScenes(isAlive && !isRecording);
-  }
-
-  /** @param {boolean} canLoad */
-  showScenes(canLoad) {
-    const { hello, node, scene, timeline } = this.app.simulation;
-    const name = node?.scene ?? scene?.name ?? timeline?.scene ?? "No scene";
-    const scenes = hello?.scenes ?? [];
-    const known = scenes.some((one) => one.name === name);
-    const options = scenes.map((one) => {
-      const isOther = node !== null && node.rate_hz > 0 && one.rate_hz !== node.rate_hz;
-      // A scene of another rate begins a new run, so its label shows the rate.
-      return make("option", { value: one.name, title: one.text }, isOther ? `${one.name} (${one.rate_hz} Hz)` : one.name);
-    });
-    if (!known) options.unshift(make("option", { value: name }, name));
-    const signature = options.map((one) => one.textContent).join();
-    if (this.scene.dataset.signature !== signature) {
-      this.scene.replaceChildren(...options);
-      this.scene.dataset.signature = signature;
-    }
-    this.scene.value = name;
-    enable(this.scene, canLoad && scenes.length > 0, canLoad ? "" : "Loading a scene needs a running node.");
+    enable(this.pause, gone);
+    enable(this.step, gone);
+    enable(this.reset, recorded("A recording cannot be reset. Use the timeline to go back."));
+    for (const button of this.modes) enable(button, recorded("A recording cannot be changed."));
+    this.sceneName.textContent = this.name() ?? "No scene";
+    this.scene.value = this.name() ?? "";
+    enable(this.scene, recorded("A recording has one scene."));
+    // A menu that cannot load anything closes.
+    if (this.scene.disabled) this.menu.dialog.close();
   }
 }
 
@@ -188,9 +200,9 @@ function setText(button, text) {
   if (label !== null && label.textContent !== text) label.textContent = text;
 }
 
-/** @param {HTMLButtonElement | HTMLSelectElement} control @param {boolean} isEnabled @param {string} reason */
-function enable(control, isEnabled, reason) {
+/** Enables a control if there is no reason against it. @param {HTMLButtonElement} control @param {string} reason */
+function enable(control, reason) {
   control.dataset.title ??= control.title;
-  control.disabled = !isEnabled;
-  control.title = isEnabled ? control.dataset.title : reason;
+  control.disabled = reason !== "";
+  control.title = reason || control.dataset.title;
 }

@@ -2,8 +2,23 @@
 
 /** @typedef {Record<string, () => void>} Keymap  keyed by KeyboardEvent.key, with letters in lower case */
 
-/** Elements that handle keys themselves. */
-const KEY_CONSUMERS = "input, select, textarea, dialog";
+/** Keys that move the choice of a focused list or slider. */
+const MOVES = new Set(["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "Home", "End", "PageUp", "PageDown"]);
+/** Keys that press a focused button or switch. */
+const PRESSES = new Set([" ", "Enter"]);
+/** Types of input elements that take no text. */
+const SWITCHES = new Set(["checkbox", "radio"]);
+
+/**
+ * True if a focused element handles a key itself, so that it is not a shortcut.
+ * @param {{ tagName: string, type?: string }} element @param {string} key
+ */
+export function isConsumed({ tagName, type = "" }, key) {
+  if (tagName === "BUTTON" || (tagName === "INPUT" && SWITCHES.has(type))) return PRESSES.has(key);
+  if (tagName === "SELECT") return MOVES.has(key) || key === "Enter";
+  if (tagName === "INPUT") return type !== "range" || MOVES.has(key);
+  return tagName === "TEXTAREA";
+}
 
 /** @param {Keymap} keymap */
 export function listenToKeys(keymap) {
@@ -12,13 +27,28 @@ export function listenToKeys(keymap) {
   document.addEventListener("keydown", (event) => {
     if (event.key === "Tab") document.documentElement.dataset.tabbed = "";
     if (event.ctrlKey || event.metaKey || event.altKey) return;
-    const target = event.target instanceof Element ? event.target : null;
-    if (target?.closest(KEY_CONSUMERS)) return;
-    // Space and Enter press a focused button: a shortcut on top could undo that.
-    if (target?.closest("button") && (event.key === " " || event.key === "Enter")) return;
+    const control = event.target instanceof Element ? event.target.closest("button, input, select, textarea") : null;
+    if (document.querySelector("dialog[open]") !== null || (control !== null && isConsumed(/** @type {HTMLInputElement} */ (control), event.key))) return;
     const action = keymap[event.key.length === 1 ? event.key.toLowerCase() : event.key];
     if (action === undefined) return;
     event.preventDefault();
     action();
   });
+}
+
+/** Gives the focus back to the picture once a pointer has used a control. A keyboard user keeps it. @param {HTMLElement} picture */
+export function returnFocus(picture) {
+  let isPointer = false;
+  document.addEventListener("pointerdown", () => { isPointer = true; }, { capture: true });
+  document.addEventListener("keydown", () => { isPointer = false; }, { capture: true });
+  const giveBack = (/** @type {Event} */ event) => {
+    const control = event.target instanceof Element ? event.target.closest("button, select, input") : null;
+    if (!isPointer || control === null || document.querySelector("dialog[open]") !== null) return;
+    const isText = control instanceof HTMLInputElement && !SWITCHES.has(control.type) && control.type !== "range";
+    // A select has its choice at `change`; a click only opens it.
+    if (isText || (event.type === "click" && control.tagName === "SELECT")) return;
+    picture.focus({ preventScroll: true });
+  };
+  document.addEventListener("click", giveBack);
+  document.addEventListener("change", giveBack);
 }

@@ -28,8 +28,14 @@ export class Views {
     this.chosen = new Map();
     /** The pose of a link, for the first scene only. @type {CameraPose | null} */
     this.linkedPose = null;
+    /** The pose of a link to a scene that is not loaded yet. @type {{ scene: string, pose: CameraPose } | null} */
+    this.poseOfScene = null;
     this.isFramed = false;
     this.isFollowing = false;
+    /** Target and distance of the last framing: a user who has changed neither sees a reset scene whole. @type {number[]} */
+    this.framed = [];
+    /** The step from which a reset shows. @type {number | null} */
+    this.resetStep = null;
     this.buttons = [...find("toggles", HTMLElement).querySelectorAll("button")];
     for (const button of this.buttons) button.addEventListener("click", () => this.toggle(button.dataset.toggle ?? ""));
     this.range.addEventListener("change", () => this.scaleHeat());
@@ -37,12 +43,14 @@ export class Views {
     app.simulation.on("ground", () => { if (!this.isFramed) this.showFirstView(); });
     app.simulation.on("frame", () => this.follow());
     app.simulation.on("stats", () => this.scaleHeat());
-    app.simulation.on("reset", () => { if (this.isFollowing) this.showFirstView(); });
+    app.simulation.on("reset", (step) => { this.resetStep = step; });
   }
 
   /** @param {import("../net/wire.js").Scene} scene */
   begin(scene) {
     const { camera, renderer, simulation } = this.app;
+    if (this.poseOfScene?.scene === scene.name) this.linkedPose = this.poseOfScene.pose;
+    this.poseOfScene = null;
     camera.axes = simulation.axes();
     camera.isFlat = scene.isPlanar;
     this.isFramed = false;
@@ -61,6 +69,7 @@ export class Views {
     camera.yaw = FIRST_VIEW.yaw;
     camera.pitch = FIRST_VIEW.pitch;
     camera.frame(firstViewBox(simulation), width / height);
+    this.framed = this.framing();
     if (this.linkedPose !== null && simulation.frame !== null) {
       Object.assign(camera, this.linkedPose);
       this.linkedPose = null;
@@ -71,11 +80,17 @@ export class Views {
     renderer.isDirty = true;
   }
 
+  framing() {
+    const { camera } = this.app;
+    return [...camera.target, camera.distance];
+  }
+
   /** Shows the whole scene as it is now, from the current direction. */
   frame() {
     const { camera, renderer, simulation } = this.app;
     const { width, height } = renderer.viewport;
     camera.frame(firstViewBox(simulation), width / height);
+    this.framed = this.framing();
     this.isFramed = true;
     renderer.isDirty = true;
   }
@@ -85,6 +100,10 @@ export class Views {
     if (simulation.frame !== null && !this.isFramed) {
       this.showFirstView();
       this.isFramed = true;
+    }
+    if (this.resetStep !== null && simulation.frame !== null && (simulation.isReplay || simulation.frame.step >= this.resetStep)) {
+      this.resetStep = null;
+      if (this.isFollowing || String(this.framed) === String(this.framing())) this.frame();
     }
     if (!this.isFollowing) return;
     const { min, max } = simulation.box();
