@@ -13,7 +13,6 @@ pub(crate) mod vectors;
 pub(crate) mod worker_pool;
 
 use lanes::LaneWork;
-use portable::Portable;
 
 /// Implementation of the step's arithmetic. All of them produce the same bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -54,7 +53,7 @@ impl Kernels {
         match self {
             #[cfg(target_arch = "x86_64")]
             Self::Avx2 if Self::has_avx2() => avx2::run(work),
-            _ => work.run::<Portable>(),
+            _ => portable::run(work),
         }
     }
 }

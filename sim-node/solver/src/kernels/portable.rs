@@ -8,7 +8,7 @@
 use std::cell::Cell;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-use super::lanes::{Lanes, Lanes8, PackedParticle, Wide};
+use super::lanes::{LaneWork, Lanes, Lanes8, PackedParticle, Wide, axes};
 
 /// Eight numbers in an array.
 #[derive(Debug, Clone, Copy)]
@@ -17,28 +17,43 @@ pub(crate) struct Portable(Lanes8);
 /// Indices of the first of three classes of numbers, by lane.
 const THIRDS: [usize; 8] = [0, 9, 18, 3, 12, 21, 6, 15];
 
+/// An array of one expression for each lane.
+///
+/// Written out: loops over the lanes would be unrolled anyway, and the compiler takes minutes for thousands
+/// of them in one function.
+macro_rules! by_lane {
+    (|$lane:ident| $value:expr) => {
+        [
+            by_lane!($lane = 0, $value),
+            by_lane!($lane = 1, $value),
+            by_lane!($lane = 2, $value),
+            by_lane!($lane = 3, $value),
+            by_lane!($lane = 4, $value),
+            by_lane!($lane = 5, $value),
+            by_lane!($lane = 6, $value),
+            by_lane!($lane = 7, $value),
+        ]
+    };
+    ($lane:ident = $number:literal, $value:expr) => {{
+        let $lane = $number;
+        $value
+    }};
+}
+
+/// Runs work on arrays. Not inlined: it would be compiled again for each of its callers.
+#[inline(never)]
+pub(crate) fn run<T: LaneWork>(work: T) -> T::Output {
+    work.run::<Portable>()
+}
+
 impl Portable {
+    /// Numbers of `low`, from 0, and of `high`, from 8.
     #[inline(always)]
-    fn zip_with(self, other: Self, with: impl Fn(f32, f32) -> f32) -> Self {
-        let mut result = self.0;
-        for (number, other) in result.iter_mut().zip(other.0) {
-            *number = with(*number, other);
-        }
-        Self(result)
-    }
-
-    #[inline(always)]
-    fn compare(self, other: Self, with: impl Fn(f32, f32) -> bool) -> [bool; 8] {
-        let mut result = [false; 8];
-        for (yes, (number, other)) in result.iter_mut().zip(self.0.into_iter().zip(other.0)) {
-            *yes = with(number, other);
-        }
-        result
-    }
-
-    #[inline(always)]
-    fn pick(low: Self, high: Self, lanes: [usize; 8]) -> Self {
-        Self(lanes.map(|lane| if lane < 8 { low.0[lane] } else { high.0[lane - 8] }))
+    fn pick(low: Self, high: Self, from: [usize; 8]) -> Self {
+        Self(by_lane!(|lane| match from[lane] {
+            number @ 0..8 => low.0[number],
+            number => high.0[number - 8],
+        }))
     }
 }
 
@@ -47,7 +62,7 @@ impl Add for Portable {
 
     #[inline(always)]
     fn add(self, other: Self) -> Self {
-        self.zip_with(other, |a, b| a + b)
+        Self(by_lane!(|lane| self.0[lane] + other.0[lane]))
     }
 }
 
@@ -56,7 +71,7 @@ impl Sub for Portable {
 
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
-        self.zip_with(other, |a, b| a - b)
+        Self(by_lane!(|lane| self.0[lane] - other.0[lane]))
     }
 }
 
@@ -65,7 +80,7 @@ impl Mul for Portable {
 
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
-        self.zip_with(other, |a, b| a * b)
+        Self(by_lane!(|lane| self.0[lane] * other.0[lane]))
     }
 }
 
@@ -74,7 +89,7 @@ impl Div for Portable {
 
     #[inline(always)]
     fn div(self, other: Self) -> Self {
-        self.zip_with(other, |a, b| a / b)
+        Self(by_lane!(|lane| self.0[lane] / other.0[lane]))
     }
 }
 
@@ -83,7 +98,7 @@ impl Neg for Portable {
 
     #[inline(always)]
     fn neg(self) -> Self {
-        Self(self.0.map(|number| -number))
+        Self(by_lane!(|lane| -self.0[lane]))
     }
 }
 
@@ -107,50 +122,45 @@ impl Lanes for Portable {
 
     #[inline(always)]
     fn sqrt(self) -> Self {
-        Self(self.0.map(f32::sqrt))
+        Self(by_lane!(|lane| self.0[lane].sqrt()))
     }
 
     #[inline(always)]
     fn abs(self) -> Self {
-        Self(self.0.map(f32::abs))
+        Self(by_lane!(|lane| self.0[lane].abs()))
     }
 
     #[inline(always)]
     fn max_or_rhs(self, rhs: Self) -> Self {
-        self.zip_with(rhs, |a, b| if a > b { a } else { b })
+        Self(by_lane!(|lane| match (self.0[lane], rhs.0[lane]) {
+            (number, rhs) if number > rhs => number,
+            (_, rhs) => rhs,
+        }))
     }
 
     #[inline(always)]
     fn is_below(self, other: Self) -> [bool; 8] {
-        self.compare(other, |a, b| a < b)
+        by_lane!(|lane| self.0[lane] < other.0[lane])
     }
 
     #[inline(always)]
     fn is_at_most(self, other: Self) -> [bool; 8] {
-        self.compare(other, |a, b| a <= b)
+        by_lane!(|lane| self.0[lane] <= other.0[lane])
     }
 
     #[inline(always)]
     fn is_not_nan(self) -> [bool; 8] {
-        self.0.map(|number| !number.is_nan())
+        by_lane!(|lane| !self.0[lane].is_nan())
     }
 
     #[inline(always)]
     fn both(a: [bool; 8], b: [bool; 8]) -> [bool; 8] {
-        let mut result = a;
-        for (yes, other) in result.iter_mut().zip(b) {
-            *yes &= other;
-        }
-        result
+        by_lane!(|lane| a[lane] & b[lane])
     }
 
     #[inline(always)]
     fn select(mask: [bool; 8], yes: Self, no: Self) -> Self {
-        let mut result = no.0;
-        for (number, (mask, yes)) in result.iter_mut().zip(mask.into_iter().zip(yes.0)) {
-            *number = if mask { yes } else { *number };
-        }
-        Self(result)
+        Self(by_lane!(|lane| if mask[lane] { yes.0[lane] } else { no.0[lane] }))
     }
 
     #[inline(always)]
@@ -160,15 +170,15 @@ impl Lanes for Portable {
 
     #[inline(always)]
     fn any(mask: [bool; 8]) -> bool {
-        mask.contains(&true)
+        Self::bits(mask) != 0
     }
 }
 
 impl Wide for Portable {
     #[inline(always)]
     fn bits(mask: [bool; 8]) -> u32 {
-        let lanes = mask.iter().enumerate();
-        lanes.fold(0, |bits, (lane, is_set)| bits | (u32::from(*is_set) << lane))
+        let [a, b, c, d, e, f, g, h] = by_lane!(|lane| u32::from(mask[lane]) << lane);
+        a | b | c | d | e | f | g | h
     }
 
     #[inline(always)]
@@ -197,8 +207,12 @@ impl Wide for Portable {
 
     #[inline(always)]
     fn unzip_thirds(numbers: [Self; 3]) -> [Self; 3] {
-        let number = |index: usize| numbers[index / 8].0[index % 8];
-        [0, 1, 2].map(|third| Self(THIRDS.map(|index| number(index + third))))
+        axes(|third| {
+            Self(by_lane!(|lane| {
+                let index = THIRDS[lane] + third;
+                numbers[index / 8].0[index % 8]
+            }))
+        })
     }
 
     #[inline(always)]
@@ -214,8 +228,8 @@ impl Wide for Portable {
 
     #[inline(always)]
     fn columns(particles: &[PackedParticle; 8]) -> [[Self; 4]; 2] {
-        let column = |number: usize| Self(particles.map(|particle| particle.0[number]));
-        [[0, 1, 2, 3].map(column), [4, 5, 6, 7].map(column)]
+        let column = |number: usize| Self(by_lane!(|lane| particles[lane].0[number]));
+        [[column(0), column(1), column(2), column(3)], [column(4), column(5), column(6), column(7)]]
     }
 
     #[inline(always)]
@@ -242,17 +256,11 @@ impl Wide for Portable {
         a: &[u32; 8],
         b: &[u32; 8],
     ) -> [[Self; 3]; 2] {
-        let mut halves = [[[0.0; 8]; 3]; 2];
-        for lane in 0..8 {
-            let (from, to) =
-                (particles[a[lane] as usize].get().0, particles[b[lane] as usize].get().0);
-            for (half, axes) in halves.iter_mut().enumerate() {
-                for (axis, numbers) in axes.iter_mut().enumerate() {
-                    numbers[lane] = to[4 * half + axis] - from[4 * half + axis];
-                }
-            }
-        }
-        halves.map(|axes| axes.map(Self))
+        let from = by_lane!(|lane| particles[a[lane] as usize].get().0);
+        let to = by_lane!(|lane| particles[b[lane] as usize].get().0);
+        let difference =
+            |number: usize| Self(by_lane!(|lane| to[lane][number] - from[lane][number]));
+        [axes(difference), axes(|axis| difference(4 + axis))]
     }
 
     #[inline(always)]
