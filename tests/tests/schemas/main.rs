@@ -176,7 +176,7 @@ fn viewers_accept_every_schema_that_the_bridge_advertises() {
     let url = bridge.wait_for_line("foxglove ws://").replace("foxglove ", "");
     let (mut client, _) = Client::start(&url);
     let topics: Vec<_> = client.topics().into_iter().map(ToOwned::to_owned).collect();
-    assert_eq!(topics.len(), 8);
+    assert_eq!(topics.len(), 10);
     let schema = |text: &Value| serde_json::from_str::<Value>(text.as_str().unwrap()).unwrap();
     for topic in &topics {
         let channel = client.channel(topic);
