@@ -187,7 +187,8 @@ fn the_unfinished_file_of_another_program_is_no_target() {
     first.flush().unwrap();
     for existing in [Existing::Refuse, Existing::Overwrite] {
         let error = write(&part, existing, "other").unwrap_err().to_string();
-        let expected = format!("{} is being written by process ", part.display());
+        // The list of locks, in which it finds the process, may lack any lock while others change.
+        let expected = format!("{} is being written by ", part.display());
         assert!(error.starts_with(&expected), "{error}");
     }
     assert_eq!(fs::read_to_string(&part).unwrap(), "one");
@@ -196,7 +197,7 @@ fn the_unfinished_file_of_another_program_is_no_target() {
     let second = write(&part, Existing::Overwrite, "two").unwrap();
     let third = write(&path, Existing::Overwrite, "three").unwrap();
     let error = second.finish().unwrap_err().to_string();
-    assert!(error.contains("is being written by process "), "{error}");
+    assert!(error.contains("is being written by "), "{error}");
     third.finish().unwrap();
     assert_eq!(fs::read_to_string(&path).unwrap(), "three");
 }

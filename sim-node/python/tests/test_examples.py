@@ -68,7 +68,8 @@ def test_snapshots_reach_rerun(start_node: StartNode, tmp_path: Path) -> None:
 def test_a_controller_pulls_a_point_to_its_height(start_node: StartNode) -> None:
     start_node("curtain", "--as-fast-as-possible")
     (distance,) = re.findall(r"is ([\d.]+) mm", run(PROGRAMS / "pull" / "pull.py"))
-    assert float(distance) < 5
+    # The breeze pushes it by a few.
+    assert float(distance) < 10
 
 
 def test_the_python_of_the_readme_runs_beside_the_curtain(start_node: StartNode) -> None:
@@ -84,7 +85,7 @@ def test_the_python_of_the_readme_runs_beside_the_curtain(start_node: StartNode)
             [sys.executable, "-c", block], capture_output=True, text=True, timeout=DEADLINE
         )
         assert done.returncode == 0, done.stderr
-        assert float(done.stdout.split()[-1].rstrip("]")) > 0.29, "it arrived"
+        assert float(done.stdout.replace("]", " ").split()[-1]) > 0.29, "it arrived"
 
 
 def test_a_tray_carries_its_cloth(start_node: StartNode) -> None:
