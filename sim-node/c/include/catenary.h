@@ -69,6 +69,27 @@ typedef enum {
   CATENARY_BUG = 9,
 } catenary_result;
 
+// Recipient of an impulse.
+enum catenary_force_kind
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  // A collider.
+  CATENARY_FORCE_KIND_COLLIDER = 0,
+  // An anchor.
+  CATENARY_FORCE_KIND_ANCHOR = 1,
+  // A pinned, grabbed or anchored particle.
+  CATENARY_FORCE_KIND_PARTICLE = 2,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum catenary_force_kind catenary_force_kind;
+#else
+typedef uint32_t catenary_force_kind;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
 // Kind of a change of the members, with the reason why a member was removed.
 enum catenary_member_change_kind
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -338,6 +359,94 @@ typedef struct {
   // Always 0.
   uint32_t spare;
 } catenary_command;
+
+// Header of `forces`: 24 bytes, alignment 8. The payload has a row for each collider, then for each anchor,
+// then for each pinned, grabbed or anchored particle, each by index.
+typedef struct {
+  // Same as in `catenary_snapshot_header`.
+  uint64_t run_id;
+  // Step in which the impulses acted.
+  uint64_t step;
+  // Length of the payload.
+  uint32_t count;
+  // Steps per second: a force is an impulse times this rate.
+  uint32_t rate_hz;
+} catenary_forces_header;
+
+// The impulse of a step on a collider, an anchor or a particle: 40 bytes, alignment 4; an element of `forces`.
+typedef struct {
+  // A `catenary_force_kind` as a number.
+  uint32_t kind;
+  // Index of the collider, anchor or particle.
+  uint32_t index;
+  // On a collider, that of the particles in contact with it; on a particle, that of its constraints, bends
+  // and tethers; on an anchor, the sum of those of its particles. In N s.
+  float impulse[3];
+  // About the center of the collider or anchor, in N m s. 0 for a particle.
+  float angular_impulse[3];
+  // Largest number of particles in contact with the collider in one substep; else 0.
+  uint32_t contacts;
+  // Always 0.
+  uint32_t spare;
+} catenary_force_row;
+
+// The impulses of a step, borrowed from the client. A force in N is `impulse` times `header.rate_hz`, and a
+// torque in N m is `angular_impulse` times it.
+typedef struct {
+  // Header of the rows: the step, and its rate.
+  catenary_forces_header header;
+  // The rows: of each collider, then of each anchor, then of each pinned, grabbed or anchored particle, each
+  // by index. The row of a collider is the one at its index.
+  const catenary_force_row *rows;
+  // Number of rows.
+  size_t row_count;
+} catenary_forces;
+
+// Header of `particles`: 112 bytes, alignment 8. Written by the node or a replay. The snapshot and
+// the keyframe of a step are together the complete state of the solver after that step.
+typedef struct {
+  // `CATENARY_CONTRACT_VERSION` of the writer.
+  uint32_t contract_version;
+  // Version of the solver's arithmetic. It changes with any change of the bits of a state.
+  uint32_t solver_version;
+  // Random number of this run of the node, or of this pass of a replay.
+  uint64_t run_id;
+  // Number of the step whose end this state is; 0 is the scene as loaded. Within a run it never
+  // goes back and skips no step, although a reader may miss snapshots.
+  uint64_t step;
+  // Steps since the scene was last loaded, reset or restored.
+  uint64_t scene_step;
+  // Step of the newest published keyframe.
+  uint64_t keyframe_step;
+  // step / rate in nanoseconds, rounded down.
+  uint64_t sim_time_ns;
+  // Time of publication: CLOCK_MONOTONIC in nanoseconds.
+  uint64_t publish_monotonic_ns;
+  // XXH3-64 of the payload. The seed is 0 while nothing is torn, else the XXH3-64 of the torn
+  // constraints' indices, ascending, as little-endian u32.
+  uint64_t state_hash;
+  // Number of outcomes in this run so far. Outcomes with a lower index are part of this state.
+  uint64_t outcome_count;
+  // Delay of the step's start after its deadline, in nanoseconds.
+  uint64_t wake_late_ns;
+  // Time that the solver took for this step, in nanoseconds.
+  uint64_t solve_ns;
+  // Number of the load in this run. Topology, surface and scene of the load carry the same number.
+  uint32_t topology_revision;
+  // Number of torn constraints.
+  uint32_t torn_count;
+  // Length of the payload.
+  uint32_t particle_count;
+  // `SnapshotFlags` bits.
+  uint32_t flags;
+  // Number of steps from one published snapshot to the next: 1, unless the node runs with
+  // `--every`. A node that pauses also publishes the step before the pause. In a replay, the distance
+  // from the snapshot before.
+  uint32_t stride;
+  // Number of snapshots that the run has published before this one, modulo 2^32. A reader that finds
+  // a number left out has missed that snapshot, whatever the steps between them.
+  uint32_t snapshot_index;
+} catenary_snapshot_header;
 
 // Header of `topology`, `surface` and `scene`: 72 bytes, alignment 8. Written once per load.
 typedef struct {
@@ -622,52 +731,6 @@ typedef struct {
   catenary_member_changes member_changes;
 } catenary_node_status;
 
-// Header of `particles`: 112 bytes, alignment 8. Written by the node or a replay. The snapshot and
-// the keyframe of a step are together the complete state of the solver after that step.
-typedef struct {
-  // `CATENARY_CONTRACT_VERSION` of the writer.
-  uint32_t contract_version;
-  // Version of the solver's arithmetic. It changes with any change of the bits of a state.
-  uint32_t solver_version;
-  // Random number of this run of the node, or of this pass of a replay.
-  uint64_t run_id;
-  // Number of the step whose end this state is; 0 is the scene as loaded. Within a run it never
-  // goes back and skips no step, although a reader may miss snapshots.
-  uint64_t step;
-  // Steps since the scene was last loaded, reset or restored.
-  uint64_t scene_step;
-  // Step of the newest published keyframe.
-  uint64_t keyframe_step;
-  // step / rate in nanoseconds, rounded down.
-  uint64_t sim_time_ns;
-  // Time of publication: CLOCK_MONOTONIC in nanoseconds.
-  uint64_t publish_monotonic_ns;
-  // XXH3-64 of the payload. The seed is 0 while nothing is torn, else the XXH3-64 of the torn
-  // constraints' indices, ascending, as little-endian u32.
-  uint64_t state_hash;
-  // Number of outcomes in this run so far. Outcomes with a lower index are part of this state.
-  uint64_t outcome_count;
-  // Delay of the step's start after its deadline, in nanoseconds.
-  uint64_t wake_late_ns;
-  // Time that the solver took for this step, in nanoseconds.
-  uint64_t solve_ns;
-  // Number of the load in this run. Topology, surface and scene of the load carry the same number.
-  uint32_t topology_revision;
-  // Number of torn constraints.
-  uint32_t torn_count;
-  // Length of the payload.
-  uint32_t particle_count;
-  // `SnapshotFlags` bits.
-  uint32_t flags;
-  // Number of steps from one published snapshot to the next: 1, unless the node runs with
-  // `--every`. A node that pauses also publishes the step before the pause. In a replay, the distance
-  // from the snapshot before.
-  uint32_t stride;
-  // Number of snapshots that the run has published before this one, modulo 2^32. A reader that finds
-  // a number left out has missed that snapshot, whatever the steps between them.
-  uint32_t snapshot_index;
-} catenary_snapshot_header;
-
 // State of a particle after a step: 32 bytes, alignment 4; an element of `particles`. The position
 // in the payload is the particle's index everywhere.
 typedef struct {
@@ -864,6 +927,26 @@ catenary_command catenary_command_rewind_back(uint32_t steps);
 // Marks the step in recordings, with a text of 1 to 160 bytes.
 catenary_command catenary_command_mark(const char *text);
 
+// Reads the newest forces on colliders, anchors and pinned, grabbed or anchored particles, and waits only if
+// none have arrived. The rows are valid until the next call of this function with this client.
+//
+// A node computes forces only while a client reads them: from the first call on, until the client is
+// detached. So the first call waits for the next step. A member of the lockstep calls it once with the
+// timeout 0 before its first turn.
+catenary_result catenary_read_forces(catenary_client *client,
+                                     double timeout_s,
+                                     catenary_forces *forces);
+
+// Reads the forces of the step of a snapshot. `snapshot` is its header, or a copy of it. Call it for snapshots
+// in their order. The rows are valid until the next call of this function with this client.
+//
+// `CATENARY_TIMEOUT` means that there are none: the snapshot is from before the first call of one of the two
+// functions, or more than 64 snapshots old, or the client has read forces of a later step.
+catenary_result catenary_read_forces_of(catenary_client *client,
+                                        const catenary_snapshot_header *snapshot,
+                                        double timeout_s,
+                                        catenary_forces *forces);
+
 // Reads the newest topology, and waits only if none was published yet. The list is valid until the next
 // call of this function with this client.
 catenary_result catenary_read_topology(catenary_client *client,
@@ -996,6 +1079,8 @@ typedef char catenary_check_parameters_header[sizeof(catenary_parameters_header)
 typedef char catenary_check_parameter_state[sizeof(catenary_parameter_state) == 24 ? 1 : -1];
 typedef char catenary_check_colliders_header[sizeof(catenary_colliders_header) == 24 ? 1 : -1];
 typedef char catenary_check_collider_state[sizeof(catenary_collider_state) == 120 ? 1 : -1];
+typedef char catenary_check_forces_header[sizeof(catenary_forces_header) == 24 ? 1 : -1];
+typedef char catenary_check_force_row[sizeof(catenary_force_row) == 40 ? 1 : -1];
 typedef char catenary_check_command[sizeof(catenary_command) == 256 ? 1 : -1];
 typedef char catenary_check_outcome[sizeof(catenary_outcome) == 296 ? 1 : -1];
 typedef char catenary_check_node_status[sizeof(catenary_node_status) == 1368 ? 1 : -1];

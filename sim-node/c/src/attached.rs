@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use sim_contract::clock::monotonic_ns;
 use sim_contract::{
-    Client, ColliderState, ConstraintState, ParameterState, TornConstraint, Triangle,
+    Client, ColliderState, ConstraintState, ForceRow, ParameterState, TornConstraint, Triangle,
 };
 
 use crate::handles::Handles;
@@ -41,6 +41,8 @@ pub(crate) struct Lists {
     pub(crate) torn: Vec<TornConstraint>,
     pub(crate) parameters: Vec<ParameterState>,
     pub(crate) colliders: Vec<ColliderState>,
+    pub(crate) forces: Vec<ForceRow>,
+    pub(crate) forces_of: Vec<ForceRow>,
     pub(crate) scene: CString,
 }
 
@@ -75,12 +77,16 @@ impl Attached {
     /// Returns the reason why nothing arrived. A program that asks often learns of the node's end a little later
     /// than one that waits.
     pub(crate) fn nothing(&self, timeout: Duration) -> Failure {
+        self.gone_or(timeout, format!("nothing arrived within {timeout:?}: is the node paused?"))
+    }
+
+    /// Same as [`Attached::nothing`], with the text for a node that lives.
+    pub(crate) fn gone_or(&self, timeout: Duration, text: String) -> Failure {
         let since = Duration::from_nanos(monotonic_ns().saturating_sub(self.looked_at_ns.get()));
         let is_due = timeout >= LOOK_PERIOD || since >= LOOK_PERIOD;
         if is_due && let Err(gone) = self.check_node() {
             return gone;
         }
-        let text = format!("nothing arrived within {timeout:?}: is the node paused?");
         Failure::new(CatenaryResult::Timeout, text)
     }
 

@@ -11,6 +11,7 @@
 mod attached;
 mod client;
 mod commands;
+mod forces;
 mod handles;
 mod lists;
 mod lockstep;
@@ -23,6 +24,7 @@ mod snapshots;
 pub use attached::ClientHandle;
 pub use client::*;
 pub use commands::*;
+pub use forces::*;
 pub use lists::*;
 pub use lockstep::*;
 pub use names::*;

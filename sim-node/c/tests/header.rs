@@ -11,14 +11,15 @@ use cbindgen::{
     Builder, Config, DocumentationStyle, EnumConfig, ItemType, Language, RenameRule, Style,
 };
 use sim_contract::{
-    CONTRACT_VERSION, ColliderState, CollidersHeader, CommandOptions, ConstraintState, LoadHeader,
-    MEMBER_CHANGES_KEPT, MEMBERS_MAX, NodeStatus, OUTCOME_FLAG_CONTROL, OUTCOME_FLAG_DISCONNECTED,
-    OUTCOME_FLAG_NEW_RUN, Outcome, ParameterState, ParametersHeader, ParticleFlags, ParticleState,
-    SnapshotFlags, SnapshotHeader, StatusFlags, TearsHeader, Text, TornConstraint, Triangle,
+    CONTRACT_VERSION, ColliderState, CollidersHeader, CommandOptions, ConstraintState, ForceRow,
+    ForcesHeader, LoadHeader, MEMBER_CHANGES_KEPT, MEMBERS_MAX, NodeStatus, OUTCOME_FLAG_CONTROL,
+    OUTCOME_FLAG_DISCONNECTED, OUTCOME_FLAG_NEW_RUN, Outcome, ParameterState, ParametersHeader,
+    ParticleFlags, ParticleState, SnapshotFlags, SnapshotHeader, StatusFlags, TearsHeader, Text,
+    TornConstraint, Triangle,
 };
 
 /// Types with their names in the header. The last ones are in no signature: numbers in messages.
-const TYPES: [(&str, &str); 34] = [
+const TYPES: [(&str, &str); 38] = [
     ("CatenaryResult", "catenary_result"),
     ("ClientHandle", "catenary_client"),
     ("Snapshot", "catenary_snapshot"),
@@ -27,6 +28,7 @@ const TYPES: [(&str, &str); 34] = [
     ("Torn", "catenary_torn"),
     ("Parameters", "catenary_parameters"),
     ("Colliders", "catenary_colliders"),
+    ("Forces", "catenary_forces"),
     ("StateToRestore", "catenary_state_to_restore"),
     ("SnapshotHeader", "catenary_snapshot_header"),
     ("ParticleState", "catenary_particle_state"),
@@ -39,6 +41,8 @@ const TYPES: [(&str, &str); 34] = [
     ("ParameterState", "catenary_parameter_state"),
     ("CollidersHeader", "catenary_colliders_header"),
     ("ColliderState", "catenary_collider_state"),
+    ("ForcesHeader", "catenary_forces_header"),
+    ("ForceRow", "catenary_force_row"),
     ("Command", "catenary_command"),
     ("Outcome", "catenary_outcome"),
     ("NodeStatus", "catenary_node_status"),
@@ -50,6 +54,7 @@ const TYPES: [(&str, &str); 34] = [
     ("ConstraintKind", "catenary_constraint_kind"),
     ("ColliderShape", "catenary_collider_shape"),
     ("TearCause", "catenary_tear_cause"),
+    ("ForceKind", "catenary_force_kind"),
     ("Method", "catenary_method"),
     ("Parameter", "catenary_parameter"),
     ("MemberChangeKind", "catenary_member_change_kind"),
@@ -170,6 +175,8 @@ fn checks() -> String {
     add("parameter_state", size_of::<ParameterState>());
     add("colliders_header", size_of::<CollidersHeader>());
     add("collider_state", size_of::<ColliderState>());
+    add("forces_header", size_of::<ForcesHeader>());
+    add("force_row", size_of::<ForceRow>());
     add("command", size_of::<sim_contract::Command>());
     add("outcome", size_of::<Outcome>());
     add("node_status", size_of::<NodeStatus>());

@@ -69,6 +69,8 @@ fn every_call_of_a_detached_client_is_refused() {
             catenary_read_torn(client, 0.0, None),
             catenary_read_parameters(client, 0.0, None),
             catenary_read_colliders(client, 0.0, None),
+            catenary_read_forces(client, 0.0, None),
+            catenary_read_forces_of(client, None, 0.0, None),
             catenary_read_scene(client, 0.0, None),
             catenary_read_status(client, 0.0, None),
             catenary_request(client, command, 0.0, None),

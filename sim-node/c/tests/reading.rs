@@ -10,8 +10,9 @@ use std::{slice, thread};
 use catenary::*;
 use sim_contract::testing::TestDomain;
 use sim_contract::{
-    ColliderState, CollidersHeader, ConstraintState, NodeStatus, Outcome, Owner, ParameterValues,
-    ParticleState, TearsHeader, TornConstraint, Triangle, Wake,
+    ColliderState, CollidersHeader, ConstraintState, ForceKind, ForceRow, ForcesHeader, NodeStatus,
+    Outcome, Owner, ParameterValues, ParticleState, SnapshotHeader, TearsHeader, TornConstraint,
+    Triangle, Wake,
 };
 use support::*;
 
@@ -76,6 +77,66 @@ fn every_list_arrives() {
     // SAFETY: the text is valid until the next call of its function.
     assert_eq!(unsafe { CStr::from_ptr(scene) }, c"version = 1");
     assert_eq!(catenary_detach(client), CatenaryResult::Ok);
+}
+
+const COLLIDER: ForceRow = ForceRow {
+    kind: ForceKind::Collider as u32,
+    index: 0,
+    impulse: [0.0, -0.25, 0.5],
+    angular_impulse: [1.0, 2.0, 3.0],
+    contacts: 4,
+    spare: 0,
+};
+
+/// Publishes the forces of a step, and then its snapshot. Returns the rows.
+fn publish_forces(owner: &Owner, step: u64) -> Vec<ForceRow> {
+    let pull = [0.0, step as f32, 0.0];
+    let other =
+        |kind, index| ForceRow { kind: kind as u32, index, impulse: pull, ..ForceRow::default() };
+    let rows = vec![COLLIDER, other(ForceKind::Anchor, 0), other(ForceKind::Particle, 1)];
+    let header = ForcesHeader { run_id: RUN_ID, step, rate_hz: 240, count: 0 };
+    owner.publish_forces(header, &rows).unwrap();
+    publish(owner, step);
+    rows
+}
+
+/// Reads the forces of a step, at once.
+fn read_of_step(client: *mut ClientHandle, step: u64) -> Result<Forces, CatenaryResult> {
+    let snapshot = SnapshotHeader { run_id: RUN_ID, step, ..SnapshotHeader::default() };
+    let mut forces = MaybeUninit::uninit();
+    let result = catenary_read_forces_of(client, Some(&snapshot), 0.0, Some(&mut forces));
+    // SAFETY: a call that succeeds writes them.
+    (result == CatenaryResult::Ok).then(|| unsafe { forces.assume_init() }).ok_or(result)
+}
+
+#[test]
+fn the_newest_forces_and_those_of_a_snapshot_arrive_from_the_first_call_on() {
+    let domain = TestDomain::new();
+    let owner = owner(&domain);
+    let client = attach(&domain, &owner);
+    assert_eq!(owner.forces_reader_count(), 0, "a client that reads none costs the node nothing");
+    let none = catenary_read_forces(client, 0.0, Some(&mut MaybeUninit::uninit()));
+    assert_eq!(none, CatenaryResult::Timeout);
+    assert_eq!(owner.forces_reader_count(), 1);
+    owner.refresh();
+    let published: Vec<_> = (1..=3).map(|step| publish_forces(&owner, step)).collect();
+
+    let of_step = read_of_step(client, 2).unwrap();
+    assert_eq!(list(of_step.rows, of_step.row_count), published[1]);
+    let expected = ForcesHeader { run_id: RUN_ID, step: 2, count: 3, rate_hz: 240 };
+    assert_eq!(of_step.header, expected);
+    assert_eq!(read_of_step(client, 1).unwrap_err(), CatenaryResult::Timeout);
+    assert!(last_error().starts_with("no forces of step 1: "), "{}", last_error());
+    let newest = read(&owner, client, catenary_read_forces);
+    assert_eq!(newest.header.step, 3);
+    assert_eq!(list(newest.rows, newest.row_count), published[2]);
+    assert_eq!(list(of_step.rows, of_step.row_count), published[1], "each function lends its own");
+
+    let wrong = catenary_read_forces_of(client, None, 0.0, Some(&mut MaybeUninit::uninit()));
+    assert_eq!(wrong, CatenaryResult::Misuse);
+    assert!(last_error().contains("snapshot is null"), "{}", last_error());
+    assert_eq!(catenary_detach(client), CatenaryResult::Ok);
+    assert_eq!(owner.forces_reader_count(), 0);
 }
 
 #[test]
