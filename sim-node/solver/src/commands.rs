@@ -9,6 +9,7 @@ use glam::Vec3;
 use sim_types::{ConstraintKind, ParameterValue, ParticleFlags, Reason};
 
 use crate::checks::{check_finite, is_near};
+use crate::contacts::bodies::driven_body::BodyMotion;
 use crate::frame::{Frame, Pose};
 use crate::parameters::Affected;
 use crate::solver::Solver;
@@ -195,6 +196,24 @@ impl Solver {
         let frame = Frame::check(&pose, self.context())?;
         let moved = self.colliders.get_mut(collider as usize);
         moved.ok_or(Reason::UnknownCollider)?.move_to(frame)
+    }
+
+    /// Moves a body through the next step: from a pose, relative to that at load, and with the given motion. Particles
+    /// in contact exchange impulses with it, by its mass and inertia; see [`Self::forces`] for their sum. After
+    /// the step it stands where it came.
+    ///
+    /// # Errors
+    /// The collider is unknown or no body, or a number is not finite or out of range.
+    pub fn drive_body(
+        &mut self,
+        collider: u32,
+        pose: Pose,
+        motion: &BodyMotion,
+    ) -> Result<(), Reason> {
+        let frame = Frame::check(&pose, self.context())?;
+        motion.check(self.is_planar)?;
+        let driven = self.colliders.get_mut(collider as usize);
+        driven.ok_or(Reason::UnknownCollider)?.drive(frame, motion)
     }
 
     /// Sets a parameter, one of [`crate::PARAMETERS`], from the next step on. `kind` selects the

@@ -1,5 +1,6 @@
 //! Contacts of particles with each other and with colliders.
 
+pub(crate) mod bodies;
 mod bounds;
 pub(crate) mod colliders;
 pub(crate) mod contact;
@@ -12,5 +13,4 @@ pub(crate) mod path;
 pub(crate) mod placed_frame;
 pub(crate) mod placed_shape;
 pub(crate) mod solid;
-pub(crate) mod solid_box;
 pub(crate) mod zone;

@@ -11,6 +11,7 @@ use crate::constraints::bends::Bend;
 use crate::constraints::builder::{ConstraintBuilder, Setup};
 use crate::constraints::order::ProjectionOrders;
 use crate::constraints::tethers::{TetherBasis, Tethers};
+use crate::contacts::bodies::BodyContacts;
 use crate::contacts::colliders::{Collider, PlacedCollider};
 use crate::contacts::obstacle::{OBSTACLES_PER_COLLIDER, Obstacle};
 use crate::contacts::pairs::ParticleContacts;
@@ -57,6 +58,7 @@ pub struct Solver {
     pub(crate) obstacles: Vec<Obstacle>,
     pub(crate) contact_mode: ContactMode,
     pub(crate) particle_contacts: ParticleContacts,
+    pub(crate) body_contacts: BodyContacts,
     pub(crate) anchors: Anchors,
     scene_anchors: Vec<SceneAnchor>,
     pub(crate) air: Air,
@@ -75,6 +77,7 @@ pub struct Solver {
     pub(crate) is_put_in_place: bool,
     /// Number of frozen particles, which their flags tell as well.
     pub(crate) frozen_count: u64,
+    pub(crate) standing_body_count: u64,
     pub(crate) state_hash: u64,
     /// None while nobody asks for forces.
     pub(crate) measurement: Option<Box<Measurement>>,
@@ -119,6 +122,7 @@ impl Solver {
             obstacles: Vec::with_capacity(OBSTACLES_PER_COLLIDER * scene.colliders.len()),
             contact_mode: scene.contact.mode,
             particle_contacts: ParticleContacts::default(),
+            body_contacts: BodyContacts::default(),
             anchors: Anchors::new(&scene.anchors, &model.particles),
             scene_anchors: scene.anchors.clone(),
             air: Air::new(scene.wind, settings.rate_hz),
@@ -134,12 +138,16 @@ impl Solver {
             has_new_tethers: false,
             is_put_in_place: false,
             frozen_count: 0,
+            standing_body_count: 0,
             measurement: None,
             offered: None,
             model: Arc::new(model),
         };
         if solver.colliders.iter().any(|collider| collider.mesh.is_some()) {
             solver.store.reserve_mesh_contacts(particle_count);
+        }
+        if solver.has_bodies() {
+            solver.body_contacts = BodyContacts::new(particle_count);
         }
         solver.finish_boundary();
         solver.has_new_tethers = false;
@@ -177,8 +185,7 @@ impl Solver {
         self.grabs.clear();
         self.anchors.reset();
         for collider in &mut self.colliders {
-            collider.moved = None;
-            collider.place(0.0);
+            collider.reset();
         }
         self.due = Due::ALL;
         self.scene_step = 0;
@@ -225,7 +232,7 @@ impl Solver {
             wind: !self.model.triangles.is_empty() && parameters.wind_drag > 0.0,
             bend_multipliers: !self.model.bends.is_empty() && parameters.iterations > 1,
             tethers: self.settings.tethers as usize,
-            particle_contacts: parameters.contact_thickness.is_some(),
+            divided_sweep: parameters.contact_thickness.is_some() || self.has_bodies(),
         }
     }
 
@@ -252,6 +259,7 @@ impl Solver {
     fn follow_particles(&mut self) {
         self.locate_forces();
         self.particle_contacts.locate(&self.store);
+        self.body_contacts.locate(&self.store);
         self.tethers.attach(&mut self.store, &self.particles);
     }
 
@@ -458,6 +466,17 @@ impl Solver {
     /// Returns the forces of the last step, if they are computed: all 0 in a step that put a state in place.
     pub fn forces(&self) -> Option<&Forces> {
         self.measurement.as_ref().map(|measurement| &measurement.forces)
+    }
+
+    /// Returns true if the scene has bodies.
+    pub(crate) fn has_bodies(&self) -> bool {
+        self.colliders.iter().any(|collider| collider.body.is_some())
+    }
+
+    /// Returns the number of steps in which a body stood because it had no command, after its first one, summed
+    /// over the bodies.
+    pub fn standing_body_count(&self) -> u64 {
+        self.standing_body_count
     }
 
     /// Returns true if the last step moved a collider.

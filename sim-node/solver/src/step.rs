@@ -83,6 +83,10 @@ impl Solver {
             }
         }
         count_step(&mut self.grabs);
+        for collider in &mut self.colliders {
+            self.standing_body_count += u64::from(collider.is_left_standing());
+            collider.end_step();
+        }
         for stage in Stage::AFTER_SUBSTEPS {
             match stage {
                 Stage::Tear => self.tear_marked(is_marked),
@@ -175,6 +179,12 @@ impl Solver {
         if self.particle_contacts.are_on() {
             let friction = self.parameters.contact_friction;
             self.particle_contacts.push_apart(&mut self.store, substep, friction);
+        }
+        if self.body_contacts.are_on() {
+            let (store, measurement) = (&mut self.store, self.measurement.as_deref_mut());
+            self.body_contacts.push(store, &mut self.colliders, &contact_substep, measurement);
+        }
+        if self.particle_contacts.are_on() || self.body_contacts.are_on() {
             self.store.run_ending(&inputs);
         }
         is_marked

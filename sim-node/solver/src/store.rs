@@ -171,7 +171,7 @@ impl ParticleStore {
         is_marked
     }
 
-    /// Runs the stages behind the contacts of particles with each other.
+    /// Runs the stages behind the division of the sweep.
     pub(crate) fn run_ending(&mut self, inputs: &SubstepInputs<'_>) {
         let Self { workers, graph, patches, .. } = self;
         graph.run_ending(workers, inputs);
@@ -252,6 +252,14 @@ impl ParticleStore {
                 let ([x, y, z], [dx, dy, dz]) = (patch.position(index), patch.displacement(index));
                 PackedParticle([x, y, z, patch.inverse_mass(index), dx, dy, dz, 0.0])
             }
+        }
+    }
+
+    /// Displacement of a particle before any constraint or contact of the substep, in a scene with colliders.
+    pub(crate) fn predicted(&self, location: Location) -> [f32; 3] {
+        match location.sheet() {
+            None => self.graph.predicted(location.index()),
+            Some(sheet) => self.patches[sheet].predicted(location.index()),
         }
     }
 

@@ -5,10 +5,12 @@ use std::sync::Arc;
 use glam::{DVec3, Quat, Vec3};
 use sim_types::Reason;
 
+use super::bodies::driven_body::{BodyMotion, BodyState, DrivenBody};
+use super::contact_substep::ContactSubstep;
 use super::mesh::CollisionMesh;
 use super::placed_shape::PlacedShape;
 use crate::frame::{Frame, angular_velocity, rotation_about};
-use crate::scene::definition::collider::{ColliderGeometry, SceneCollider};
+use crate::scene::definition::collider::{ColliderBody, ColliderGeometry, SceneCollider};
 
 /// A collider and its motion.
 #[derive(Debug, Clone)]
@@ -20,6 +22,9 @@ pub(crate) struct Collider {
     pub(crate) friction: f32,
     velocity: DVec3,
     angular_velocity: DVec3,
+    pub(crate) body: Option<ColliderBody>,
+    /// The copy of the body in the next or the running step; None in a step without its command.
+    pub(crate) driven: Option<DrivenBody>,
     /// Frame that a client has set; it replaces the collider's own motion.
     pub(crate) moved: Option<Frame>,
     /// Frame at the start of the running step.
@@ -57,6 +62,8 @@ impl Collider {
             friction: scene.friction,
             velocity: Vec3::from_array(scene.velocity).as_dvec3(),
             angular_velocity: Vec3::from_array(scene.angular_velocity).as_dvec3(),
+            body: scene.body,
+            driven: None,
             moved: None,
             start: Frame::AT_LOAD,
             end: Frame::AT_LOAD,
@@ -76,11 +83,28 @@ impl Collider {
             return Err(Reason::OutOfRange);
         }
         self.moved = Some(frame);
+        self.driven = None;
         Ok(())
+    }
+
+    /// Drives its body in the next step, from a frame.
+    pub(crate) fn drive(&mut self, frame: Frame, motion: &BodyMotion) -> Result<(), Reason> {
+        let body = self.body.as_ref().ok_or(Reason::NoEffectHere)?;
+        let at_load = (self.at_load.center(), self.at_load.axes());
+        self.moved = Some(frame);
+        self.driven = Some(DrivenBody::new(body, at_load, frame, motion));
+        Ok(())
+    }
+
+    /// Forgets the frame and the motion that clients have set.
+    pub(crate) fn reset(&mut self) {
+        (self.moved, self.driven) = (None, None);
+        self.place(0.0);
     }
 
     /// Places it as after a step that ends at `time_s`, in seconds.
     pub(crate) fn place(&mut self, time_s: f64) {
+        self.driven = None;
         self.end = self.frame(time_s);
         self.start = self.end;
         let is_own = self.moved.is_none();
@@ -92,10 +116,47 @@ impl Collider {
     pub(crate) fn begin_step(&mut self, time_s: f64, dt: f32) {
         self.start = self.end;
         self.end = self.frame(time_s);
-        if self.moved.is_some() {
+        if let Some(body) = &self.driven {
+            self.follow(body.at_start());
+            self.start = self.end;
+        } else if self.moved.is_some() {
             self.linear = (self.end.translation - self.start.translation) / dt;
             self.angular = angular_velocity(self.start.rotation, self.end.rotation, dt);
         }
+    }
+
+    /// Begins a substep of a driven body. Returns false if the collider is none in this step.
+    pub(crate) fn begin_body_substep(&mut self, substep: &ContactSubstep) -> bool {
+        let Some(body) = &mut self.driven else { return false };
+        body.begin_substep(substep.h, substep.gain);
+        self.start = body.before();
+        self.follow_body();
+        true
+    }
+
+    /// Places it at the pose of its driven body at the end of the running substep.
+    pub(crate) fn follow_body(&mut self) {
+        if let Some(body) = &self.driven {
+            self.follow(body.state());
+        }
+    }
+
+    /// Ends a step. The copy of the body is gone, and the collider stays where it came.
+    pub(crate) fn end_step(&mut self) {
+        if let Some(body) = self.driven.take() {
+            let BodyState { frame, .. } = body.state();
+            self.start = body.at_start().frame;
+            self.moved = Some(frame);
+        }
+    }
+
+    fn follow(&mut self, BodyState { frame, linear, angular }: BodyState) {
+        (self.end, self.linear, self.angular) = (frame, linear, angular);
+    }
+
+    /// True for a body that stands in the running step, because its program has not sent its command.
+    pub(crate) fn is_left_standing(&self) -> bool {
+        self.body.is_some() && self.moved.is_some() && self.driven.is_none()
     }
 
     /// Frame by its own motion, or the one that a client has set.

@@ -41,14 +41,15 @@ pub(crate) struct Surface {
 /// Largest number of obstacles that a collider makes: bounds have six faces.
 pub(crate) const OBSTACLES_PER_COLLIDER: usize = 6;
 
-/// Replaces the obstacles by those of a substep, in the order of the scene.
+/// Replaces the obstacles by those of a substep, in the order of the scene. Driven bodies are none.
 pub(crate) fn place_obstacles(
     obstacles: &mut Vec<Obstacle>,
     colliders: &[Collider],
     substep: &ContactSubstep,
 ) {
     obstacles.clear();
-    for (index, collider) in colliders.iter().enumerate() {
+    let others = colliders.iter().enumerate().filter(|(_, collider)| collider.driven.is_none());
+    for (index, collider) in others {
         let surface = Surface::new(collider, substep);
         for solid in solids(collider, substep).into_iter().flatten() {
             let zone = solid.zone();

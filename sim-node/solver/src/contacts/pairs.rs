@@ -9,7 +9,7 @@
 
 mod box_tree;
 mod load;
-mod order;
+pub(crate) mod order;
 mod pair;
 mod push;
 mod surfaces;

@@ -130,6 +130,17 @@ impl PlacedShape {
         }
     }
 
+    /// Rotation of its own axes.
+    pub(crate) fn axes(&self) -> Quat {
+        match *self {
+            Self::Box { rotation, .. } | Self::Mesh { rotation, .. } => rotation,
+            Self::Plane { .. }
+            | Self::Sphere { .. }
+            | Self::Capsule { .. }
+            | Self::Bounds { .. } => Quat::IDENTITY,
+        }
+    }
+
     /// The point about which it rotates; for a plane, the point nearest to the origin.
     pub(crate) fn center(&self) -> Vec3 {
         match *self {

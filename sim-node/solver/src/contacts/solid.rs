@@ -1,11 +1,13 @@
 //! Solids: where a path through a collider leaves it.
 
 pub(crate) mod lane_solid;
+pub(crate) mod solid_box;
 
 use std::sync::Arc;
 
 use glam::{Quat, Vec3};
 use lane_solid::{HalfSpace, LaneSolid, SolidSphere};
+use solid_box::{FaceHit, SolidBox};
 
 use super::colliders::Collider;
 use super::contact_substep::ContactSubstep;
@@ -14,7 +16,6 @@ use super::mesh::{CollisionMesh, PlacedMesh};
 use super::path::SubstepPath;
 use super::placed_frame::PlacedFrame;
 use super::placed_shape::PlacedShape;
-use super::solid_box::{FaceHit, SolidBox};
 use super::zone::Zone;
 
 /// A convex solid, a half-space or a mesh, at its pose at the end of a substep.

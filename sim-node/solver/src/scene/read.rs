@@ -1,6 +1,7 @@
 //! From TOML text to a checked scene. Each value is checked where it is read.
 
 mod anchor;
+mod body;
 mod collider;
 mod contact;
 mod element;

@@ -122,10 +122,13 @@ impl Measurement {
         self.substep.fill(Reaction::default());
         store.take_reactions(&mut self.substep);
         for (sum, reaction) in self.reactions.iter_mut().zip(&self.substep) {
-            let contacts = sum.contacts.max(reaction.contacts);
-            sum.add_all(reaction);
-            sum.contacts = contacts;
+            add_substep(sum, reaction);
         }
+    }
+
+    /// Adds the reaction of a substep to one collider.
+    pub(crate) fn add(&mut self, collider: usize, reaction: &Reaction) {
+        add_substep(&mut self.reactions[collider], reaction);
     }
 
     /// Computes the impulses of a step with substeps of `h` seconds.
@@ -169,6 +172,12 @@ impl Measurement {
             one.impulse = [0.0; 3];
         }
     }
+}
+
+fn add_substep(sum: &mut Reaction, reaction: &Reaction) {
+    let contacts = sum.contacts.max(reaction.contacts);
+    sum.add_all(reaction);
+    sum.contacts = contacts;
 }
 
 /// True for the flags of a particle that forces act on: pinned, grabbed or anchored.

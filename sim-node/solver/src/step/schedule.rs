@@ -21,8 +21,9 @@ pub(crate) struct ScheduledStage {
 pub(crate) struct OptionalStages {
     pub(crate) limit_stretch: bool,
     pub(crate) tether: bool,
-    /// It needs all particles at once, so it divides the sweep.
-    pub(crate) particle_contact: bool,
+    /// Contacts of particles with each other or with bodies need all particles at once, so they divide the
+    /// sweep.
+    pub(crate) divides_sweep: bool,
     pub(crate) contact: bool,
 }
 
@@ -34,7 +35,7 @@ impl OptionalStages {
             Stage::LimitStretch => pass.is_last() && self.limit_stretch,
             Stage::Tether => pass.is_last() && self.tether,
             Stage::Contact | Stage::Advance => {
-                pass.is_last() && !self.particle_contact && self.ends_with(stage)
+                pass.is_last() && !self.divides_sweep && self.ends_with(stage)
             }
             Stage::Drive
             | Stage::Wind
@@ -45,7 +46,7 @@ impl OptionalStages {
         }
     }
 
-    /// True for the stages behind the contacts of particles with each other.
+    /// True for the stages behind the division of the sweep.
     fn ends_with(self, stage: Stage) -> bool {
         stage == Stage::Advance || (stage == Stage::Contact && self.contact)
     }
@@ -56,7 +57,7 @@ impl OptionalStages {
 pub(crate) struct Schedule {
     /// Passes differ only in being the first, the last, both, or neither.
     passes: [Vec<ScheduledStage>; 4],
-    /// The stages behind [`Stage::ParticleContact`]; empty without it.
+    /// The stages behind the division; empty without it.
     ending: Vec<ScheduledStage>,
 }
 
@@ -91,14 +92,14 @@ impl Schedule {
             }
         }
         self.ending.clear();
-        if optional.particle_contact {
+        if optional.divides_sweep {
             let stages = Stage::OF_SUBSTEP.into_iter().filter(|stage| optional.ends_with(*stage));
             let scheduled = |stage| ScheduledStage { stage, group: 0, reach: 0, lag: 0 };
             self.ending.extend(stages.map(scheduled));
         }
     }
 
-    /// The stages behind [`Stage::ParticleContact`]; none without it.
+    /// The stages behind the division of the sweep; none without it.
     pub(crate) fn ending(&self) -> &[ScheduledStage] {
         &self.ending
     }
@@ -129,7 +130,7 @@ mod tests {
         let optional = OptionalStages {
             limit_stretch: true,
             tether: true,
-            particle_contact: false,
+            divides_sweep: false,
             contact: true,
         };
         schedule.rebuild(optional, &[1, 0].into_iter(), &[2].into_iter());

@@ -29,6 +29,7 @@ use crate::constraints::parameters::{ConstraintParameters, PassSoftness};
 use crate::kernels::Kernels;
 use crate::kernels::huge_pages::refill;
 use crate::kernels::lanes::{Lanes8, PackedParticle};
+use crate::kernels::vectors::lane_of;
 use crate::scene::model::Model;
 use crate::state::particles::Particle;
 use crate::step::schedule::{Schedule, ScheduledStage};
@@ -257,7 +258,7 @@ impl Graph {
         is_marked
     }
 
-    /// Runs the stages behind the contacts of particles with each other.
+    /// Runs the stages behind the division of the sweep.
     pub(crate) fn run_ending(&mut self, workers: &mut Workers, inputs: &SubstepInputs<'_>) {
         let schedule = std::mem::take(&mut self.schedule);
         self.run_particle_stages(workers, schedule.ending(), inputs);
@@ -343,6 +344,11 @@ impl Graph {
     pub(crate) fn displacement(&self, index: usize) -> [f32; 3] {
         let [_, _, _, _, x, y, z, _] = self.particles[index].0;
         [x, y, z]
+    }
+
+    /// Displacement before any constraint or contact, in a scene with colliders.
+    pub(crate) fn predicted(&self, index: usize) -> [f32; 3] {
+        lane_of(&self.predicted[index / 8], index % 8)
     }
 
     /// Returns the particles, and the padding behind them.

@@ -15,8 +15,8 @@ pub(crate) struct SceneFields {
     pub(crate) bend_multipliers: bool,
     /// For each tether of a particle: the position of the root, and the length with its square.
     pub(crate) tethers: usize,
-    /// Particles touch each other. It takes no memory in the store.
-    pub(crate) particle_contacts: bool,
+    /// Particles touch each other or bodies, which divides the sweep. It takes no memory in the store.
+    pub(crate) divided_sweep: bool,
 }
 
 /// Fields in memory, and those in use. Fields that fall out of use stay in memory, so that a change
@@ -28,7 +28,7 @@ pub(crate) struct Layout {
     /// Constraint fields that the current parameters use.
     pub(crate) used: ConstraintFields,
     pub(crate) is_wind_used: bool,
-    pub(crate) has_particle_contacts: bool,
+    pub(crate) has_divided_sweep: bool,
 }
 
 impl Layout {
@@ -37,7 +37,7 @@ impl Layout {
         let scene_fields = SceneFields {
             wind: self.scene.wind || scene.wind,
             bend_multipliers: self.scene.bend_multipliers || scene.bend_multipliers,
-            particle_contacts: false,
+            divided_sweep: false,
             ..scene
         };
         Self {
@@ -45,7 +45,7 @@ impl Layout {
             scene: scene_fields,
             used,
             is_wind_used: scene.wind,
-            has_particle_contacts: scene.particle_contacts,
+            has_divided_sweep: scene.divided_sweep,
         }
     }
 
@@ -69,7 +69,7 @@ impl Layout {
         OptionalStages {
             limit_stretch: self.used.max_lengths,
             tether: self.scene.tethers > 0,
-            particle_contact: self.has_particle_contacts,
+            divides_sweep: self.has_divided_sweep,
             contact: self.scene.colliders,
         }
     }

@@ -22,7 +22,7 @@ use std::ops::Range;
 use band::{Band, PassSweep, SweepWork};
 use band_forces::SheetForces;
 use bend_layout::BendLayout;
-use row_layout::{LINE_LENGTH, RowLayout};
+use row_layout::{LINE_LENGTH, RowLayout, STATE_FIELDS};
 use span::Span;
 use wind::SheetWindWork;
 
@@ -207,7 +207,7 @@ impl Patch {
         is_marked
     }
 
-    /// Runs the stages behind the contacts of particles with each other.
+    /// Runs the stages behind the division of the sweep.
     pub(crate) fn run_ending(&mut self, workers: &mut Workers, inputs: &SubstepInputs<'_>) {
         let schedule = std::mem::take(&mut self.schedule);
         let last = Pass { index: 0, count: 1 };
@@ -319,6 +319,11 @@ impl Patch {
     #[inline(always)]
     pub(crate) fn displacement(&self, index: usize) -> [f32; 3] {
         self.vector(index, 4)
+    }
+
+    /// Displacement before any constraint or contact, in a scene with colliders.
+    pub(crate) fn predicted(&self, index: usize) -> [f32; 3] {
+        self.vector(index, STATE_FIELDS)
     }
 
     pub(crate) fn set_position(&mut self, index: usize, position: [f32; 3]) {

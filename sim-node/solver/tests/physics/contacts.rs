@@ -1,5 +1,6 @@
 //! Velocities after contacts: bounces, friction, moving surfaces, corners.
 
+mod bodies;
 mod cloths;
 mod crossings;
 mod meshes;

@@ -23,6 +23,13 @@ impl Reaction {
         self.angular += arm.as_dvec3().cross(linear);
     }
 
+    /// Adds an impulse, times the length of a substep, at the end of an arm.
+    pub(crate) fn add_impulse(&mut self, impulse: Vec3, arm: Vec3) {
+        let linear = impulse.as_dvec3();
+        self.linear += linear;
+        self.angular += arm.as_dvec3().cross(linear);
+    }
+
     pub(crate) fn add_all(&mut self, other: &Self) {
         self.linear += other.linear;
         self.angular += other.angular;

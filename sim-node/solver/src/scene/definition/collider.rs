@@ -28,6 +28,21 @@ pub struct SceneCollider {
     /// The triangles of a mesh. All other shapes have none.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub mesh: Option<ColliderMesh>,
+    /// The rigid body that another program moves.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub body: Option<ColliderBody>,
+}
+
+/// Mass of a rigid body that another program moves. Its center of mass is the center of the collider.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ColliderBody {
+    /// In kg, > 0.
+    #[serde(with = "decimal::number")]
+    pub mass: f32,
+    /// Principal moments of inertia in kg unit^2, > 0: about the own axes of a box or mesh, and about the
+    /// axes of the scene at load for a sphere or capsule.
+    #[serde(with = "decimal::vector")]
+    pub inertia: [f32; 3],
 }
 
 /// The triangles of a mesh, relative to its center and before its rotation.

@@ -5,6 +5,7 @@ use std::ops::Range;
 use serde::Deserialize;
 use sim_types::{ColliderShape, NumberRange};
 
+use super::body::FileBody;
 use super::mesh::MeshKeys;
 use super::reader::{ANGULAR_VELOCITY, Reader, SIZE};
 use super::value::{
@@ -41,6 +42,7 @@ pub(super) struct FileCollider {
     scale: Option<Number>,
     distance: Option<Number>,
     solid: Option<Spanned<bool>>,
+    body: Option<Spanned<Table<FileBody>>>,
 }
 
 impl TableKeys for FileCollider {}
@@ -52,9 +54,9 @@ const DISTANCE: NumberRange = NumberRange { min: 0.0, text: "0 to 1e7", ..Number
 fn keys(shape: ColliderShape) -> &'static [&'static str] {
     match shape {
         ColliderShape::Plane => &["normal", "offset"],
-        ColliderShape::Box => &["center", "half_extents", "rotation", "angular_velocity"],
-        ColliderShape::Sphere => &["center", "radius"],
-        ColliderShape::Capsule => &["a", "b", "radius"],
+        ColliderShape::Box => &["center", "half_extents", "rotation", "angular_velocity", "body"],
+        ColliderShape::Sphere => &["center", "radius", "body"],
+        ColliderShape::Capsule => &["a", "b", "radius", "body"],
         ColliderShape::Bounds => &["min", "max"],
         ColliderShape::Mesh => &[
             "path",
@@ -66,6 +68,7 @@ fn keys(shape: ColliderShape) -> &'static [&'static str] {
             "distance",
             "solid",
             "angular_velocity",
+            "body",
         ],
     }
 }
@@ -88,7 +91,7 @@ impl FileCollider {
     }
 
     /// Returns the places of the keys that belong to single shapes.
-    fn shape_keys(&self) -> [(&'static str, Option<Range<usize>>); 17] {
+    fn shape_keys(&self) -> [(&'static str, Option<Range<usize>>); 18] {
         fn span<T>(value: Option<&Spanned<T>>) -> Option<Range<usize>> {
             value.map(Spanned::span)
         }
@@ -110,6 +113,7 @@ impl FileCollider {
             ("scale", span(self.scale.as_ref())),
             ("distance", span(self.distance.as_ref())),
             ("solid", span(self.solid.as_ref())),
+            ("body", span(self.body.as_ref())),
         ]
     }
 }
@@ -129,6 +133,10 @@ impl Reader<'_> {
         };
         let shape = fields.geometry()?;
         let is_mesh = matches!(shape, ColliderGeometry::Mesh { .. });
+        let body = file.body.as_ref().map(|table| self.body(&field, table)).transpose()?;
+        if body.is_some() {
+            self.refuse_motion(&field, file)?;
+        }
         Ok(SceneCollider {
             shape,
             restitution: number_or_zero("restitution", &file.restitution, NumberRange::SHARE)?,
@@ -136,7 +144,27 @@ impl Reader<'_> {
             velocity: self.vector_or(&field("velocity"), file.velocity.as_ref(), [0.0; 3])?,
             angular_velocity: self.angular_velocity(&field, file.angular_velocity.as_ref())?,
             mesh: is_mesh.then(|| fields.mesh()).transpose()?,
+            body,
         })
+    }
+
+    /// Refuses a velocity of a body, which its commands move.
+    fn refuse_motion(
+        &self,
+        field: &impl Fn(&str) -> String,
+        file: &FileCollider,
+    ) -> Result<(), SceneError> {
+        let keys = [("velocity", &file.velocity), ("angular_velocity", &file.angular_velocity)];
+        for (key, value) in keys {
+            let moving = value
+                .as_ref()
+                .filter(|value| value.get_ref().iter().any(|number| *number.get_ref() != 0.0));
+            if let Some(value) = moving {
+                let problem = "a body has no motion of its own (allowed: [0, 0, 0])";
+                return self.error(value.span(), &field(key), problem);
+            }
+        }
+        Ok(())
     }
 
     /// Returns an angular velocity; by default 0. In 2-D a box rotates about z only.
