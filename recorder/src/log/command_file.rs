@@ -121,12 +121,16 @@ fn action(fields: &Map<String, Value>) -> Result<Action, FieldError> {
     }
     for name in own() {
         match fields.get(name) {
-            Some(value) if is_valid(name, value) => {}
+            Some(value) if is_valid(row.kind, name, value) => {}
             Some(value) => {
-                return Err(invalid(name, &format!("{value} is invalid"), allowed_values(name)));
+                return Err(invalid(
+                    name,
+                    &format!("{value} is invalid"),
+                    allowed_values(row.kind, name),
+                ));
             }
             None if row.required.contains(&name) => {
-                return Err(missing(name, allowed_values(name)));
+                return Err(missing(name, allowed_values(row.kind, name)));
             }
             None => {}
         }
@@ -150,19 +154,18 @@ fn integer(fields: &Map<String, Value>, name: &str, min: u64) -> Result<Option<u
     }
 }
 
-fn is_valid(name: &str, value: &Value) -> bool {
+fn is_valid(kind: &str, name: &str, value: &Value) -> bool {
     let is_number = |value: &Value| serde_json::from_value::<PlainF32>(value.clone()).is_ok();
     let are_numbers =
         |count| value.as_array().is_some_and(|all| all.len() == count && all.iter().all(is_number));
     match name {
-        "target" | "center" | "delta" | "from" | "to" | "direction" | "translation" => {
-            are_numbers(3)
-        }
         "rotation" => are_numbers(4),
         "over_s" | "radius" | "limit" => is_number(value),
         "value" => value.is_null() || is_number(value) || are_numbers(3),
         "constraint_kind" => value.is_string(),
-        "force" => value.is_boolean(),
+        "force" if kind == "release" => value.is_boolean(),
+        "target" | "center" | "delta" | "from" | "to" | "direction" | "translation"
+        | "velocity" | "angular_velocity" | "force" | "torque" => are_numbers(3),
         "to_step" => value.is_u64(),
         "contents" => value == "state" || value == "motion",
         "state_hash" => value.as_str().is_some_and(|text| u64::from_str_radix(text, 16).is_ok()),
@@ -173,7 +176,7 @@ fn is_valid(name: &str, value: &Value) -> bool {
     }
 }
 
-fn allowed_values(name: &str) -> &'static str {
+fn allowed_values(kind: &str, name: &str) -> &'static str {
     match name {
         "target" | "center" | "delta" | "from" | "to" | "translation" => "three numbers in m",
         "direction" => "three numbers",
@@ -182,7 +185,11 @@ fn allowed_values(name: &str) -> &'static str {
         "radius" | "limit" => "a number in m",
         "value" => "a number, three numbers, or null for off",
         "parameter" => "the name of a parameter, at most 160 bytes",
-        "force" => "true or false",
+        "velocity" => "three numbers in m/s",
+        "angular_velocity" => "three numbers in rad/s",
+        "force" if kind == "release" => "true or false",
+        "force" => "three numbers in N",
+        "torque" => "three numbers in N m",
         "to_step" => "whole numbers from 0",
         "contents" => "state or motion",
         "state_hash" => "16 hex digits in a string",
@@ -282,6 +289,11 @@ mod tests {
             r#"{"step":1,"kind":"push","center":[0,1,2],"radius":1,"delta":[0,1,2],"limit":null}"#,
             r#"{"step":1,"kind":"move_anchor","anchor":0,"translation":[0,1,2],"rotation":[1]}"#,
             r#"{"step":1,"kind":"set","parameter":"gravity","value":[0,1]}"#,
+            r#"{"step":1,"kind":"drive_body","collider":0,"translation":[0,1,2],"force":true}"#,
+            r#"{"step":1,"kind":"drive_body","collider":0,"translation":[0,1,2],"velocity":1}"#,
+            r#"{"step":1,"kind":"drive_body","collider":0,"translation":[0,1,2],"angular_velocity":0}"#,
+            r#"{"step":1,"kind":"drive_body","collider":0,"translation":[0,1,2],"torque":[0,1]}"#,
+            r#"{"step":1,"kind":"release","particle":0,"force":[0,1,2]}"#,
             r#"{"step":1,"kind":"set","parameter":"gravity"}"#,
             r#"{"step":1,"kind":"set","parameter":7,"value":null}"#,
             r#"{"step":1,"kind":"set","parameter":"x","value":1,"constraint_kind":0}"#,
@@ -294,8 +306,8 @@ mod tests {
         drag.jsonl:2: step: is missing (allowed: whole numbers from 1)
         drag.jsonl:2: step: 0 is invalid (allowed: whole numbers from 1)
         drag.jsonl:2: step: 1.5 is invalid (allowed: whole numbers from 1)
-        drag.jsonl:2: kind: is missing (allowed: pin, unpin, grab, move, release, pause, resume, step, reset, push, cut, cut_radius, cut_segment, move_anchor, move_collider, set, load, rewind, restore, mark)
-        drag.jsonl:2: kind: "dance" is unknown (allowed: pin, unpin, grab, move, release, pause, resume, step, reset, push, cut, cut_radius, cut_segment, move_anchor, move_collider, set, load, rewind, restore, mark)
+        drag.jsonl:2: kind: is missing (allowed: pin, unpin, grab, move, release, pause, resume, step, reset, push, cut, cut_radius, cut_segment, move_anchor, move_collider, set, load, rewind, restore, mark, drive_body)
+        drag.jsonl:2: kind: "dance" is unknown (allowed: pin, unpin, grab, move, release, pause, resume, step, reset, push, cut, cut_radius, cut_segment, move_anchor, move_collider, set, load, rewind, restore, mark, drive_body)
         drag.jsonl:2: particle: is missing (allowed: whole numbers 0..=4294967295)
         drag.jsonl:2: particle: -1 is invalid (allowed: whole numbers 0..=4294967295)
         drag.jsonl:2: colour: is not a field of "pin" (allowed: particle, step, kind, client_id, sequence, index, status, reason, disconnected, new_run)
@@ -305,6 +317,11 @@ mod tests {
         drag.jsonl:2: limit: null is invalid (allowed: a number in m)
         drag.jsonl:2: rotation: [1] is invalid (allowed: four numbers: a quaternion x, y, z, w)
         drag.jsonl:2: value: [0,1] is invalid (allowed: a number, three numbers, or null for off)
+        drag.jsonl:2: force: true is invalid (allowed: three numbers in N)
+        drag.jsonl:2: velocity: 1 is invalid (allowed: three numbers in m/s)
+        drag.jsonl:2: angular_velocity: 0 is invalid (allowed: three numbers in rad/s)
+        drag.jsonl:2: torque: [0,1] is invalid (allowed: three numbers in N m)
+        drag.jsonl:2: force: [0,1,2] is invalid (allowed: true or false)
         drag.jsonl:2: value: is missing (allowed: a number, three numbers, or null for off)
         drag.jsonl:2: parameter: 7 is invalid (allowed: the name of a parameter, at most 160 bytes)
         drag.jsonl:2: constraint_kind: 0 is invalid (allowed: structural, shear, bend or tether)

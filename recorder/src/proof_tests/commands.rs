@@ -64,6 +64,11 @@ angular_velocity = [0, 2, 0]
 shape = "sphere"
 center = [0.35, 0.5, -0.3]
 radius = 0.1
+[[collider]]
+shape = "sphere"
+center = [0.35, 0.6, 0.2]
+radius = 0.1
+body = { mass = 0.05, inertia = [0.0002, 0.0002, 0.0002] }
 "#;
 
 /// Every kind of command. The tests below refer to the lines by step.
@@ -74,6 +79,7 @@ pub(super) const COMMANDS: &str = r#"
     {"step":9,"kind":"cut_segment","from":[-0.05,0.4,0],"to":[0.25,0.4,0],"direction":[0,0,1]}
     {"step":11,"kind":"move_anchor","anchor":0,"translation":[0.05,0,0.05]}
     {"step":13,"kind":"move_collider","collider":2,"translation":[0,0,0.4],"rotation":[0,0,1,1]}
+    {"step":14,"kind":"drive_body","collider":3,"translation":[0,0,-0.15],"velocity":[0,0,-1]}
     {"step":15,"kind":"grab","particle":60,"target":[0.5,0.2,0.3],"over_s":0.1}
     {"step":17,"kind":"move","particle":60,"target":[0.5,0.5,0.8]}
     {"step":19,"kind":"pause"}
@@ -281,8 +287,18 @@ fn wrong_values_are_rejected_with_their_reason_and_change_nothing() {
             r#""kind":"move_anchor","anchor":0,"translation":[0,0,0],"rotation":[0,0,0,0]"#,
             "out_of_range",
         ),
-        (r#""kind":"move_collider","collider":3,"translation":[0,0,0]"#, "unknown_collider"),
+        (r#""kind":"move_collider","collider":4,"translation":[0,0,0]"#, "unknown_collider"),
         (r#""kind":"move_collider","collider":0,"translation":["inf",0,0]"#, "non_finite"),
+        (r#""kind":"drive_body","collider":4,"translation":[0,0,0]"#, "unknown_collider"),
+        (r#""kind":"drive_body","collider":2,"translation":[0,0,0]"#, "no_effect_here"),
+        (
+            r#""kind":"drive_body","collider":3,"translation":[0,0,0],"velocity":[2e7,0,0]"#,
+            "out_of_range",
+        ),
+        (
+            r#""kind":"drive_body","collider":3,"translation":[0,0,0],"torque":["nan",0,0]"#,
+            "non_finite",
+        ),
         (r#""kind":"set","parameter":"colour","value":1"#, "unknown_parameter"),
         (r#""kind":"set","parameter":"gravity","value":1"#, "out_of_range"),
         (r#""kind":"set","parameter":"gravity","value":["nan",0,0]"#, "non_finite"),

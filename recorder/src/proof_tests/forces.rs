@@ -38,7 +38,7 @@ fn each_step_has_its_forces_with_the_same_bytes_for_any_number_of_threads() {
     let rows = rows(&file);
     let steps: Vec<_> = rows.iter().map(|row| row.step).collect();
     assert_eq!(steps, (1..=STEPS).collect::<Vec<_>>());
-    assert!(rows.iter().all(|row| (row.colliders.len(), row.anchors.len()) == (3, 1)));
+    assert!(rows.iter().all(|row| (row.colliders.len(), row.anchors.len()) == (4, 1)));
     let has_force = |one: &[PlainF32; 3]| one.iter().any(|number| number.0 != 0.0);
     assert!(rows.iter().any(|row| row.colliders.iter().any(|one| has_force(&one.impulse))));
     assert!(rows.iter().any(|row| has_force(&row.anchors[0].impulse)));

@@ -332,6 +332,8 @@ typedef struct catenary_client catenary_client;
 // | 17 load | | | `text` scene |
 // | 18 rewind | step, low 32 bits | | `count` step, high 32 bits; or `CATENARY_OPTION_BACK` and `count` steps |
 // | 19 restore | hash, low 32 bits | | `count` hash, high 32 bits; `CATENARY_OPTION_STATE` or `CATENARY_OPTION_MOTION` |
+// | 20 mark | | | `text` |
+// | 21 drive_body | collider | translation, velocity, angular velocity | `rotation`, `Command::wrench` |
 typedef struct {
   // Number of the action in the table above.
   uint32_t kind;
@@ -354,7 +356,7 @@ typedef struct {
   uint32_t count;
   // `CommandOptions` bits.
   uint32_t options;
-  // UTF-8 text, padded with zeros.
+  // UTF-8 text, padded with zeros; force and torque of `drive_body`, see `Command::wrench`.
   uint8_t text[CATENARY_TEXT_SIZE_BYTES_MAX];
   // Always 0.
   uint32_t spare;
@@ -674,7 +676,7 @@ typedef struct {
   catenary_member_change last[CATENARY_MEMBER_CHANGES_KEPT];
 } catenary_member_changes;
 
-// Status of a node or replay: 1368 bytes, alignment 8. Written by the owner of the name at 10 Hz, and at
+// Status of a node or replay: 1376 bytes, alignment 8. Written by the owner of the name at 10 Hz, and at
 // once after a change of the members, before the step that follows it. Percentiles cover the steps of the last second.
 typedef struct {
   // `CATENARY_CONTRACT_VERSION` of the writer.
@@ -707,6 +709,9 @@ typedef struct {
   uint64_t rejected_count;
   // Number of frozen particles, whose state was not finite.
   uint64_t frozen_count;
+  // Number of steps in which a body stood, because no `drive_body` came for it after the first; of the scene since
+  // its load.
+  uint64_t standing_body_steps;
   // Steps per second.
   uint32_t rate_hz;
   // Number of particles in the scene.
@@ -901,6 +906,21 @@ catenary_command catenary_command_move_collider(uint32_t collider,
                                                 const float *translation,
                                                 const float *rotation);
 
+// Moves a body through the next step, with its mass and inertia. `translation` and `rotation` are as in
+// `catenary_command_move_anchor`; `velocity` (m/s) and `angular_velocity` (rad/s) are those at the start of the step.
+// A null velocity is 0. `catenary_command_with_wrench` adds a force and a torque.
+catenary_command catenary_command_drive_body(uint32_t collider,
+                                             const float *translation,
+                                             const float *rotation,
+                                             const float *velocity,
+                                             const float *angular_velocity);
+
+// Adds a force (N) on the center of the body and a torque (N m) about it to a `catenary_command_drive_body`,
+// beside gravity and the contacts. A null vector is 0. Other commands stay as they are.
+catenary_command catenary_command_with_wrench(catenary_command command,
+                                              const float *force,
+                                              const float *torque);
+
 // Sets a parameter, such as "damping", to a number.
 catenary_command catenary_command_set(const char *parameter, float value);
 
@@ -1083,6 +1103,6 @@ typedef char catenary_check_forces_header[sizeof(catenary_forces_header) == 24 ?
 typedef char catenary_check_force_row[sizeof(catenary_force_row) == 40 ? 1 : -1];
 typedef char catenary_check_command[sizeof(catenary_command) == 256 ? 1 : -1];
 typedef char catenary_check_outcome[sizeof(catenary_outcome) == 296 ? 1 : -1];
-typedef char catenary_check_node_status[sizeof(catenary_node_status) == 1368 ? 1 : -1];
+typedef char catenary_check_node_status[sizeof(catenary_node_status) == 1376 ? 1 : -1];
 
 #endif  /* CATENARY_H */

@@ -154,6 +154,58 @@ pub extern "C" fn catenary_command_move_collider(
     command(numbers(translation).map(action))
 }
 
+/// Moves a body through the next step, with its mass and inertia. `translation` and `rotation` are as in
+/// `catenary_command_move_anchor`; `velocity` (m/s) and `angular_velocity` (rad/s) are those at the start of the step.
+/// A null velocity is 0. `catenary_command_with_wrench` adds a force and a torque.
+#[unsafe(no_mangle)]
+pub extern "C" fn catenary_command_drive_body(
+    collider: u32,
+    translation: *const f32,
+    rotation: *const f32,
+    velocity: *const f32,
+    angular_velocity: *const f32,
+) -> Command {
+    let action = |translation| Action::DriveBody {
+        collider,
+        translation,
+        rotation: numbers(rotation).unwrap_or(IDENTITY),
+        velocity: numbers(velocity).unwrap_or_default(),
+        angular_velocity: numbers(angular_velocity).unwrap_or_default(),
+        force: [0.0; 3],
+        torque: [0.0; 3],
+    };
+    command(numbers(translation).map(action))
+}
+
+/// Adds a force (N) on the center of the body and a torque (N m) about it to a `catenary_command_drive_body`,
+/// beside gravity and the contacts. A null vector is 0. Other commands stay as they are.
+#[unsafe(no_mangle)]
+pub extern "C" fn catenary_command_with_wrench(
+    command: Command,
+    force: *const f32,
+    torque: *const f32,
+) -> Command {
+    let Action::DriveBody { collider, translation, rotation, velocity, angular_velocity, .. } =
+        command.action()
+    else {
+        return command;
+    };
+    let (force, torque) = (numbers(force).unwrap_or_default(), numbers(torque).unwrap_or_default());
+    Command::new(
+        command.client_id,
+        command.sequence,
+        Action::DriveBody {
+            collider,
+            translation,
+            rotation,
+            velocity,
+            angular_velocity,
+            force,
+            torque,
+        },
+    )
+}
+
 /// No rotation.
 const IDENTITY: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
 

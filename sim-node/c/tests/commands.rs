@@ -21,6 +21,8 @@ fn set(parameter: &str, value: ParameterValue) -> Action {
     Action::Set { parameter: short(parameter), value, constraint_kind: None }
 }
 
+const ZERO: [f32; 3] = [0.0; 3];
+
 #[test]
 fn each_function_makes_the_command_of_its_name() {
     let (a, b, c) = (A.as_ptr(), B.as_ptr(), C.as_ptr());
@@ -82,6 +84,35 @@ fn each_function_makes_the_command_of_its_name() {
 }
 
 #[test]
+fn a_body_is_driven_with_or_without_velocities_and_a_wrench() {
+    let (a, b, c) = (A.as_ptr(), B.as_ptr(), C.as_ptr());
+    let body = |rotation, angular_velocity, force, torque| Action::DriveBody {
+        collider: 2,
+        translation: A,
+        rotation,
+        velocity: B,
+        angular_velocity,
+        force,
+        torque,
+    };
+    let cases = [
+        (catenary_command_drive_body(2, a, null(), b, null()), body(UNTURNED, ZERO, ZERO, ZERO)),
+        (
+            catenary_command_with_wrench(
+                catenary_command_drive_body(2, a, QUARTER.as_ptr(), b, c),
+                c,
+                a,
+            ),
+            body(QUARTER, C, C, A),
+        ),
+        (catenary_command_with_wrench(catenary_command_pin(7), a, b), Action::Pin { particle: 7 }),
+    ];
+    for (made, action) in cases {
+        assert_eq!(made, Command::new(0, 0, action), "{action:?}");
+    }
+}
+
+#[test]
 fn a_bad_argument_makes_the_empty_command() {
     let (a, none) = (A.as_ptr(), null());
     let long = [b'x'; 161].iter().chain(&[0]).copied().collect::<Vec<_>>();
@@ -95,6 +126,7 @@ fn a_bad_argument_makes_the_empty_command() {
         catenary_command_cut_segment(a, a, none),
         catenary_command_move_anchor(0, none, null()),
         catenary_command_move_collider(0, none, null()),
+        catenary_command_drive_body(0, none, null(), a, a),
         catenary_command_set(null(), 1.0),
         catenary_command_set_vector(c"gravity".as_ptr(), none),
         catenary_command_set_off(c"\xff".as_ptr()),

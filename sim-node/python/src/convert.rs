@@ -19,6 +19,7 @@ pub(crate) type Vector = Numbers<3>;
 pub(crate) type Quaternion = Numbers<4>;
 
 impl Vector {
+    pub(crate) const ZERO: Self = Self([0.0; 3]);
     pub(crate) const Z: Self = Self([0.0, 0.0, 1.0]);
 }
 

@@ -77,7 +77,7 @@ pub struct Solver {
     pub(crate) is_put_in_place: bool,
     /// Number of frozen particles, which their flags tell as well.
     pub(crate) frozen_count: u64,
-    pub(crate) standing_body_count: u64,
+    pub(crate) standing_body_steps: u64,
     pub(crate) state_hash: u64,
     /// None while nobody asks for forces.
     pub(crate) measurement: Option<Box<Measurement>>,
@@ -138,7 +138,7 @@ impl Solver {
             has_new_tethers: false,
             is_put_in_place: false,
             frozen_count: 0,
-            standing_body_count: 0,
+            standing_body_steps: 0,
             measurement: None,
             offered: None,
             model: Arc::new(model),
@@ -475,8 +475,8 @@ impl Solver {
 
     /// Returns the number of steps in which a body stood because it had no command, after its first one, summed
     /// over the bodies.
-    pub fn standing_body_count(&self) -> u64 {
-        self.standing_body_count
+    pub fn standing_body_steps(&self) -> u64 {
+        self.standing_body_steps
     }
 
     /// Returns true if the last step moved a collider.

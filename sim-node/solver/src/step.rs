@@ -84,7 +84,7 @@ impl Solver {
         }
         count_step(&mut self.grabs);
         for collider in &mut self.colliders {
-            self.standing_body_count += u64::from(collider.is_left_standing());
+            self.standing_body_steps += u64::from(collider.is_left_standing());
             collider.end_step();
         }
         for stage in Stage::AFTER_SUBSTEPS {

@@ -81,6 +81,8 @@ pub(crate) enum CommandVerb {
         #[command(flatten)]
         pose: PoseArgs,
     },
+    /// Move a body of another program through the next step
+    DriveBody(DriveBodyArgs),
     /// Set a parameter of the simulation
     Set(SetArgs),
     /// Load another scene; the step number continues
@@ -223,6 +225,35 @@ pub(crate) struct CutSegmentArgs {
     #[arg(long, num_args = 3, action = ArgAction::Set, default_values = ["0", "0", "1"],
         value_names = ["DX", "DY", "DZ"], value_parser = number)]
     pub(crate) direction: Vec<f32>,
+}
+
+#[derive(Debug, ClapArgs)]
+#[command(
+    allow_negative_numbers = true,
+    after_help = "Example: sim-node ctl drive-body 0 0 0.1 0 --velocity 0 -1.5 0 --force 2 0 0"
+)]
+pub(crate) struct DriveBodyArgs {
+    /// Index of the collider that is the body
+    #[arg(value_parser = index)]
+    pub(crate) collider: u32,
+    #[command(flatten)]
+    pub(crate) pose: PoseArgs,
+    /// Velocity of its center, in m/s
+    #[arg(long, num_args = 3, action = ArgAction::Set, default_values = ["0", "0", "0"],
+        value_names = ["VX", "VY", "VZ"], value_parser = number)]
+    pub(crate) velocity: Vec<f32>,
+    /// Angular velocity, in rad/s
+    #[arg(long, num_args = 3, action = ArgAction::Set, default_values = ["0", "0", "0"],
+        value_names = ["WX", "WY", "WZ"], value_parser = number)]
+    pub(crate) angular_velocity: Vec<f32>,
+    /// Force on its center in N, beside gravity and the contacts
+    #[arg(long, num_args = 3, action = ArgAction::Set, default_values = ["0", "0", "0"],
+        value_names = ["FX", "FY", "FZ"], value_parser = number)]
+    pub(crate) force: Vec<f32>,
+    /// Torque about its center in N m, beside that of the contacts
+    #[arg(long, num_args = 3, action = ArgAction::Set, default_values = ["0", "0", "0"],
+        value_names = ["TX", "TY", "TZ"], value_parser = number)]
+    pub(crate) torque: Vec<f32>,
 }
 
 /// A pose relative to the pose at load.

@@ -54,6 +54,18 @@ pub(super) fn from_verb(
             let (translation, rotation) = translation_and_rotation(pose)?;
             Action::MoveCollider { collider: *collider, translation, rotation }
         }
+        CommandVerb::DriveBody(args) => {
+            let (translation, rotation) = translation_and_rotation(&args.pose)?;
+            Action::DriveBody {
+                collider: args.collider,
+                translation,
+                rotation,
+                velocity: numbers(&args.velocity)?,
+                angular_velocity: numbers(&args.angular_velocity)?,
+                force: numbers(&args.force)?,
+                torque: numbers(&args.torque)?,
+            }
+        }
         CommandVerb::Set(args) => Action::Set {
             parameter: text(&args.parameter)?,
             value: args.value().map_err(anyhow::Error::msg)?,
@@ -154,6 +166,19 @@ mod tests {
         let rotation = [0.0, -0.6, 0.0, 0.8];
         let expected = Action::MoveCollider { collider: 2, translation, rotation };
         assert_eq!(action("move-collider 2 0 0.1 -0.2 --rotation 0 -0.6 0 0.8"), expected);
+        let body = |angular_velocity, force| Action::DriveBody {
+            collider: 2,
+            translation,
+            rotation,
+            velocity: [0.0, -1.5, 0.0],
+            angular_velocity,
+            force,
+            torque: force,
+        };
+        let line = "drive-body 2 0 0.1 -0.2 --rotation 0 -0.6 0 0.8 --velocity 0 -1.5 0";
+        assert_eq!(action(line), body([0.0; 3], [0.0; 3]));
+        let line = format!("{line} --angular-velocity 1 -2 3 --force 4 5 -6 --torque 4 5 -6");
+        assert_eq!(action(&line), body([1.0, -2.0, 3.0], [4.0, 5.0, -6.0]));
     }
 
     #[test]

@@ -134,6 +134,9 @@ fn missing_condition(action: &Action) -> Option<&'static str> {
              mesh, or with [[bend]]"
         }
         Action::Set { .. } => "method \"xpbd\" has compliance, method \"pbd\" has stiffness",
+        Action::DriveBody { .. } => {
+            "the collider is no body; the scene makes it one with body = { mass, inertia }"
+        }
         Action::Step { .. } => "the node is not paused",
         Action::Load { .. } => "it needs more memory than is available; see the node's messages",
         Action::Rewind { .. } => "the node keeps no history; start it without --history 0",

@@ -23,6 +23,7 @@ pub(crate) struct StatusRow {
     constraints: u32,
     pub(super) torn_constraints: u32,
     frozen_particles: u64,
+    standing_body_steps: u64,
     pub(crate) readers: u32,
     outcomes: u64,
     pub(super) rejected_commands: u64,
@@ -67,6 +68,7 @@ impl StatusRow {
             constraints: status.constraint_count,
             torn_constraints: status.torn_count,
             frozen_particles: status.frozen_count,
+            standing_body_steps: status.standing_body_steps,
             readers: status.reader_count,
             outcomes: status.outcome_count,
             rejected_commands: status.rejected_count,
@@ -118,6 +120,9 @@ impl StatusRow {
             ("wake-up delay", times(self.wake_late_ns_p50, self.wake_late_ns_p99)),
             ("step time", times(self.solve_ns_p50, self.solve_ns_p99)),
         ];
+        if self.standing_body_steps > 0 {
+            lines.push(("bodies", format!("stood in {} steps", self.standing_body_steps)));
+        }
         lines.extend(self.lockstep.iter().map(|member| ("lockstep", member.describe())));
         lines
     }

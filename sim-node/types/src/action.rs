@@ -1,14 +1,18 @@
 //! The actions that clients ask a node to perform.
 
 mod allowed_values;
+mod fields;
+mod kind_filter;
 
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde::{Deserialize, Serialize};
 
-use crate::constraint_kind::ConstraintKind;
 use crate::json::hash;
 use crate::json::non_finite::{number, optional_number, rotation, vector};
 use crate::parameter::ParameterValue;
 use crate::text::Text;
+
+pub use fields::ActionFields;
+pub use kind_filter::KindFilter;
 
 /// Default time in which a grabbed particle reaches its target, in seconds: one frame at 60 Hz.
 pub const GRAB_OVER_S_DEFAULT: f32 = 1.0 / 60.0;
@@ -172,58 +176,36 @@ pub enum Action {
         /// Text for people and for programs that read the log. Empty text is rejected.
         text: Text,
     },
+    /// Moves a body through the next step, by its mass and inertia, with impulses from the particles that it
+    /// meets. After the step it stands where it came.
+    DriveBody {
+        /// Index of the collider that is the body.
+        collider: u32,
+        /// Translation at the start of the step in m, relative to the pose at load.
+        #[serde(with = "vector")]
+        translation: [f32; 3],
+        /// Rotation at the start of the step relative to the pose at load, as the quaternion x, y, z, w.
+        #[serde(default = "identity", with = "rotation")]
+        rotation: [f32; 4],
+        /// Velocity of its center at the start of the step in m/s.
+        #[serde(default, with = "vector")]
+        velocity: [f32; 3],
+        /// Angular velocity at the start of the step in rad/s.
+        #[serde(default, with = "vector")]
+        angular_velocity: [f32; 3],
+        /// Force on its center in N, beside gravity and the contacts.
+        #[serde(default, with = "vector")]
+        force: [f32; 3],
+        /// Torque about its center in N m, beside that of the contacts.
+        #[serde(default, with = "vector")]
+        torque: [f32; 3],
+    },
     /// A kind that this version does not know. Always rejected.
     Unknown {
         /// Number of the kind on the wire. The number of a known kind becomes `u32::MAX` there, which
         /// no version will assign, so that an unknown action never becomes a known one.
         number: u32,
     },
-}
-
-/// The fields of a kind of action in its JSON form, besides `kind`.
-#[derive(Debug)]
-pub struct ActionFields {
-    /// Name of the kind.
-    pub kind: &'static str,
-    /// Fields that must be present.
-    pub required: &'static [&'static str],
-    /// Fields that may be absent.
-    pub optional: &'static [&'static str],
-}
-
-impl ActionFields {
-    /// All kinds, in the order of their numbers on the wire.
-    pub const ALL: [Self; 21] = [
-        Self::new("pin", &["particle"], &[]),
-        Self::new("unpin", &["particle"], &[]),
-        Self::new("grab", &["particle", "target"], &["over_s"]),
-        Self::new("move", &["particle", "target"], &["over_s"]),
-        Self::new("release", &["particle"], &["force"]),
-        Self::new("pause", &[], &[]),
-        Self::new("resume", &[], &[]),
-        Self::new("step", &["count"], &[]),
-        Self::new("reset", &[], &[]),
-        Self::new("push", &["center", "radius", "delta"], &["limit"]),
-        Self::new("cut", &["constraint"], &[]),
-        Self::new("cut_radius", &["center", "radius"], &[]),
-        Self::new("cut_segment", &["from", "to", "direction"], &[]),
-        Self::new("move_anchor", &["anchor", "translation"], &["rotation"]),
-        Self::new("move_collider", &["collider", "translation"], &["rotation"]),
-        Self::new("set", &["parameter", "value"], &["constraint_kind"]),
-        Self::new("load", &["scene"], &[]),
-        Self::new("rewind", &[], &["to_step", "back_steps"]),
-        Self::new("restore", &["contents", "state_hash"], &[]),
-        Self::new("mark", &["text"], &[]),
-        Self::new("unknown", &["number"], &[]),
-    ];
-
-    const fn new(
-        kind: &'static str,
-        required: &'static [&'static str],
-        optional: &'static [&'static str],
-    ) -> Self {
-        Self { kind, required, optional }
-    }
 }
 
 fn grab_over_s_default() -> f32 {
@@ -258,60 +240,12 @@ impl RestoreContents {
     }
 }
 
-/// The kind of constraints that a `set` addresses. Its JSON form is the name of the kind.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum KindFilter {
-    /// The constraints of one kind.
-    Known(ConstraintKind),
-    /// A kind that this version does not know. The command is rejected like any wrong value. The name
-    /// is not kept: it is written as "unknown".
-    Unknown,
-}
-
-impl KindFilter {
-    /// Returns the filter for a kind's name.
-    pub fn from_name(name: &str) -> Self {
-        ConstraintKind::from_name(name).map_or(Self::Unknown, Self::Known)
-    }
-
-    /// Returns the filter for a kind's number on the wire.
-    pub fn from_number(number: u32) -> Self {
-        ConstraintKind::from_number(number).map_or(Self::Unknown, Self::Known)
-    }
-
-    /// Number on the wire. An unknown kind has `u32::MAX`, which no version will assign.
-    pub fn number(self) -> u32 {
-        match self {
-            Self::Known(kind) => kind as u32,
-            Self::Unknown => u32::MAX,
-        }
-    }
-
-    /// Name of the kind, or "unknown".
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Known(kind) => kind.name(),
-            Self::Unknown => "unknown",
-        }
-    }
-}
-
-impl Serialize for KindFilter {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_str(self.name())
-    }
-}
-
-impl<'de> Deserialize<'de> for KindFilter {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        String::deserialize(deserializer).map(|name| Self::from_name(&name))
-    }
-}
-
 impl Action {
     /// Samples for tests of formats: one action of each kind, or several if it has options.
     #[doc(hidden)]
     pub fn samples() -> Vec<Self> {
+        use crate::constraint_kind::ConstraintKind;
+
         let target = [0.1, -2.0, 3.5];
         let delta = [0.0, -0.0, 1e-9];
         let rotation = [0.0, 0.6, 0.0, 0.8];
@@ -350,6 +284,15 @@ impl Action {
             Self::Restore { contents: RestoreContents::State, state_hash: 0x0123_4567_89ab_cdef },
             Self::Restore { contents: RestoreContents::Motion, state_hash: 0 },
             Self::Mark { text: Text::cut("the sleeve slips, größer") },
+            Self::DriveBody {
+                collider: 2,
+                translation: target,
+                rotation,
+                velocity: [0.0, -1.5, 0.25],
+                angular_velocity: delta,
+                force: [0.5, 0.0, 0.0],
+                torque: [0.0, 0.0, -0.125],
+            },
             Self::Unknown { number: 99 },
         ]
     }

@@ -47,6 +47,7 @@ pub fn parse(payload: &[u8], epoch: u32) -> Result<Command, String> {
             Command::Push { center, radius, delta, limit }
         }
         Action::Rewind { .. } => return Err("rewind is not accepted here".to_owned()),
+        Action::DriveBody { .. } => return Err("drive_body is not accepted here".to_owned()),
         Action::Restore { .. } => return Err("restore is not accepted here".to_owned()),
         Action::Unknown { .. } => return Err("no such command".to_owned()),
     })

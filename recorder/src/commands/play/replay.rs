@@ -364,6 +364,7 @@ impl Replay {
             status.late_steps = row.late_steps;
             status.skipped_periods = row.skipped_periods;
             status.frozen_count = row.frozen_count;
+            status.standing_body_steps = row.standing_body_steps;
         }
         status.set_scene_name(&self.run.scene_name);
         self.owner.publish_status(&status)?;

@@ -110,7 +110,7 @@ struct ActionSchema {
     #[schemars(skip_serializing_if = "Option::is_none")]
     particle: Option<u32>,
     #[schemars(skip_serializing_if = "Option::is_none")]
-    force: Option<bool>,
+    force: Option<ForceSchema>,
     #[schemars(skip_serializing_if = "Option::is_none")]
     target: Option<[JsonNumber; 3]>,
     #[schemars(skip_serializing_if = "Option::is_none")]
@@ -142,6 +142,12 @@ struct ActionSchema {
     #[schemars(skip_serializing_if = "Option::is_none")]
     rotation: Option<[JsonNumber; 4]>,
     #[schemars(skip_serializing_if = "Option::is_none")]
+    velocity: Option<[JsonNumber; 3]>,
+    #[schemars(skip_serializing_if = "Option::is_none")]
+    angular_velocity: Option<[JsonNumber; 3]>,
+    #[schemars(skip_serializing_if = "Option::is_none")]
+    torque: Option<[JsonNumber; 3]>,
+    #[schemars(skip_serializing_if = "Option::is_none")]
     parameter: Option<String>,
     #[schemars(skip_serializing_if = "Option::is_none")]
     value: Option<ParameterValueSchema>,
@@ -159,6 +165,15 @@ struct ActionSchema {
     state_hash: Option<String>,
     #[schemars(skip_serializing_if = "Option::is_none")]
     text: Option<String>,
+}
+
+/// The schema of `force`: of a release, or on a body.
+#[derive(JsonSchema)]
+#[schemars(untagged, rename = "Force")]
+#[allow(dead_code, reason = "only its schema is used")]
+enum ForceSchema {
+    Release(bool),
+    Body([JsonNumber; 3]),
 }
 
 /// The schema of a parameter's value. No value means off.

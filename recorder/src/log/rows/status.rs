@@ -25,6 +25,8 @@ pub struct StatusRow {
     pub rejected_count: u64,
     #[serde(default)]
     pub frozen_count: u64,
+    #[serde(default)]
+    pub standing_body_steps: u64,
     pub rate_hz: u32,
     pub particle_count: u32,
     pub constraint_count: u32,
@@ -53,6 +55,7 @@ impl From<&NodeStatus> for StatusRow {
             outcome_count: status.outcome_count,
             rejected_count: status.rejected_count,
             frozen_count: status.frozen_count,
+            standing_body_steps: status.standing_body_steps,
             rate_hz: status.rate_hz,
             particle_count: status.particle_count,
             constraint_count: status.constraint_count,

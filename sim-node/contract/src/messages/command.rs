@@ -32,6 +32,8 @@ pub const CONSOLE_CLIENT_ID: u64 = 0;
 /// | 17 load | | | `text` scene |
 /// | 18 rewind | step, low 32 bits | | `count` step, high 32 bits; or [`CommandOptions::BACK`] and `count` steps |
 /// | 19 restore | hash, low 32 bits | | `count` hash, high 32 bits; [`CommandOptions::STATE`] or [`CommandOptions::MOTION`] |
+/// | 20 mark | | | `text` |
+/// | 21 drive_body | collider | translation, velocity, angular velocity | `rotation`, [`Command::wrench`] |
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable, ZeroCopySend)]
 #[repr(C)]
 #[type_name("catenary.Command")]
@@ -57,7 +59,7 @@ pub struct Command {
     pub count: u32,
     /// [`CommandOptions`] bits.
     pub options: u32,
-    /// UTF-8 text, padded with zeros.
+    /// UTF-8 text, padded with zeros; force and torque of `drive_body`, see [`Command::wrench`].
     pub text: [u8; Text::SIZE_BYTES_MAX],
     /// Always 0.
     pub spare: u32,
@@ -121,11 +123,14 @@ mod kind {
     pub(super) const REWIND: u32 = 18;
     pub(super) const RESTORE: u32 = 19;
     pub(super) const MARK: u32 = 20;
+    pub(super) const DRIVE_BODY: u32 = 21;
     /// No version will assign it.
     pub(super) const UNKNOWN: u32 = u32::MAX;
 }
 
 const ZERO: [f32; 3] = [0.0; 3];
+
+const WRENCH_SIZE_BYTES: usize = size_of::<[[f32; 3]; 2]>();
 
 impl Command {
     /// Encodes an action as the command `sequence` of the client `client_id`.
@@ -190,6 +195,19 @@ impl Command {
             Action::Mark { text } => {
                 Self { text: text.to_wire(), ..Self::with_kind(kind::MARK, 0) }
             }
+            Action::DriveBody {
+                collider,
+                translation,
+                rotation,
+                velocity,
+                angular_velocity,
+                force,
+                torque,
+            } => Self {
+                vectors: [translation, velocity, angular_velocity],
+                rotation,
+                ..Self::with_kind(kind::DRIVE_BODY, collider).with_wrench([force, torque])
+            },
             Action::Unknown { number } => Self::unknown(number),
         }
     }
@@ -229,6 +247,17 @@ impl Command {
 
     fn with_vector(self, vector: [f32; 3], number: f32) -> Self {
         Self { vectors: [vector, ZERO, ZERO], number, ..self }
+    }
+
+    fn with_wrench(self, wrench: [[f32; 3]; 2]) -> Self {
+        let mut command = self;
+        command.text[..WRENCH_SIZE_BYTES].copy_from_slice(bytemuck::bytes_of(&wrench));
+        command
+    }
+
+    /// Force in N and torque in N m of `drive_body`: the first six f32 of `text`.
+    pub fn wrench(&self) -> [[f32; 3]; 2] {
+        bytemuck::pod_read_unaligned(&self.text[..WRENCH_SIZE_BYTES])
     }
 
     fn from_value(value: ParameterValue, constraint_kind: Option<KindFilter>) -> Self {
@@ -294,6 +323,18 @@ impl Command {
                 None => Action::Unknown { number: kind::RESTORE },
             },
             kind::MARK => Action::Mark { text: Text::from_wire(&self.text) },
+            kind::DRIVE_BODY => {
+                let [force, torque] = self.wrench();
+                Action::DriveBody {
+                    collider: index,
+                    translation: first,
+                    rotation,
+                    velocity: second,
+                    angular_velocity: third,
+                    force,
+                    torque,
+                }
+            }
             number => Action::Unknown { number },
         }
     }
@@ -357,7 +398,7 @@ mod tests {
         let mut numbers: Vec<_> =
             Action::samples().into_iter().map(|action| Command::new(0, 0, action).kind).collect();
         numbers.dedup();
-        let expected: Vec<_> = (1..=20).chain([99]).collect();
+        let expected: Vec<_> = (1..=21).chain([99]).collect();
         assert_eq!(numbers, expected);
         for kind in (0..=1000).filter(|kind| !numbers.contains(kind)) {
             let action = Command { kind, ..Command::new(0, 0, Action::Pause) }.action();
@@ -370,7 +411,7 @@ mod tests {
         for number in (0..=100).chain([u32::MAX - 1, u32::MAX]) {
             let decoded = Command::new(0, 0, Action::Unknown { number }).action();
             let is_known =
-                (1..=20).contains(&number) && ![kind::SET, kind::RESTORE].contains(&number);
+                (1..=21).contains(&number) && ![kind::SET, kind::RESTORE].contains(&number);
             let expected = if is_known { u32::MAX } else { number };
             assert_eq!(decoded, Action::Unknown { number: expected });
         }

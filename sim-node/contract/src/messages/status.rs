@@ -6,7 +6,7 @@ use iceoryx2::prelude::ZeroCopySend;
 use crate::limits::MEMBERS_MAX;
 use crate::messages::member_changes::MemberChanges;
 
-/// Status of a node or replay: 1368 bytes, alignment 8. Written by the owner of the name at 10 Hz, and at
+/// Status of a node or replay: 1376 bytes, alignment 8. Written by the owner of the name at 10 Hz, and at
 /// once after a change of the members, before the step that follows it. Percentiles cover the steps of the last second.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable, ZeroCopySend)]
 #[repr(C)]
@@ -42,6 +42,9 @@ pub struct NodeStatus {
     pub rejected_count: u64,
     /// Number of frozen particles, whose state was not finite.
     pub frozen_count: u64,
+    /// Number of steps in which a body stood, because no `drive_body` came for it after the first; of the scene since
+    /// its load.
+    pub standing_body_steps: u64,
     /// Steps per second.
     pub rate_hz: u32,
     /// Number of particles in the scene.
@@ -66,7 +69,7 @@ pub struct NodeStatus {
     pub member_changes: MemberChanges,
 }
 
-const _: () = assert!(size_of::<NodeStatus>() == 1368 && align_of::<NodeStatus>() == 8);
+const _: () = assert!(size_of::<NodeStatus>() == 1376 && align_of::<NodeStatus>() == 8);
 
 /// A member of the lockstep: 24 bytes, alignment 8.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable, ZeroCopySend)]

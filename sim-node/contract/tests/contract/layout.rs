@@ -155,6 +155,7 @@ fn write_command_and_status_layouts(text: &mut String) {
             outcome_count,
             rejected_count,
             frozen_count,
+            standing_body_steps,
             rate_hz,
             particle_count,
             constraint_count,

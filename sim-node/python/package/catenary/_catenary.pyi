@@ -282,6 +282,16 @@ class Action:
         collider: int, translation: Vector, rotation: Vector = ...
     ) -> Action: ...
     @staticmethod
+    def drive_body(
+        collider: int,
+        translation: Vector,
+        rotation: Vector = ...,
+        velocity: Vector = ...,
+        angular_velocity: Vector = ...,
+        force: Vector = ...,
+        torque: Vector = ...,
+    ) -> Action: ...
+    @staticmethod
     def set(
         parameter: str, value: float | Vector | None, kind: str | None = None
     ) -> Action: ...

@@ -85,6 +85,30 @@ class Commands(ABC, Generic[Result]):
         """
         return self._perform(Action.move_collider(collider, translation, rotation))
 
+    def drive_body(
+        self,
+        collider: int,
+        translation: Vector,
+        rotation: Vector = (0.0, 0.0, 0.0, 1.0),
+        *,
+        velocity: Vector = (0.0, 0.0, 0.0),
+        angular_velocity: Vector = (0.0, 0.0, 0.0),
+        force: Vector = (0.0, 0.0, 0.0),
+        torque: Vector = (0.0, 0.0, 0.0),
+    ) -> Result:
+        """Moves a body of another program through the next step, from a pose relative to the loaded one.
+
+        The collider has a `body` in the scene, with mass and inertia. Within the step gravity, force (N), torque
+        (N m) and contacts change its velocity (m/s) and angular velocity (rad/s), which are those at the start
+        of the step. The row of the collider in the forces of the step has the impulse of the contacts, for your
+        own body. In a step without this command the body stands.
+        """
+        return self._perform(
+            Action.drive_body(
+                collider, translation, rotation, velocity, angular_velocity, force, torque
+            )
+        )
+
     def set(self, **values: float | Vector | Mapping[str, float] | None) -> Result:
         """Sets parameters by name, such as `set(gravity=(0, 0, 0), damping=0.5)`. None turns one off.
 

@@ -128,6 +128,37 @@ impl Action {
     }
 
     #[staticmethod]
+    #[pyo3(signature = (
+        collider,
+        translation,
+        rotation=Quaternion::IDENTITY,
+        velocity=Vector::ZERO,
+        angular_velocity=Vector::ZERO,
+        force=Vector::ZERO,
+        torque=Vector::ZERO,
+    ))]
+    #[allow(clippy::too_many_arguments, reason = "these are the keywords of Python")]
+    fn drive_body(
+        #[pyo3(from_py_with = arguments::collider)] collider: u32,
+        translation: Vector,
+        rotation: Quaternion,
+        velocity: Vector,
+        angular_velocity: Vector,
+        force: Vector,
+        torque: Vector,
+    ) -> Self {
+        Self(sim_contract::Action::DriveBody {
+            collider,
+            translation: translation.0,
+            rotation: rotation.0,
+            velocity: velocity.0,
+            angular_velocity: angular_velocity.0,
+            force: force.0,
+            torque: torque.0,
+        })
+    }
+
+    #[staticmethod]
     #[pyo3(signature = (parameter, value, kind=None))]
     fn set(parameter: &str, value: &Bound<'_, PyAny>, kind: Option<&str>) -> PyResult<Self> {
         Ok(Self(sim_contract::Action::Set {

@@ -4,6 +4,7 @@ use sim_types::{Action, CLIENT_ID_END, KindFilter, Parameter, ParameterValue, Re
 
 use super::cut::{Sphere, Sweep};
 use super::{Grab, Push};
+use crate::contacts::bodies::driven_body::BodyMotion;
 use crate::frame::Pose;
 use crate::solver::Solver;
 
@@ -12,7 +13,7 @@ use crate::solver::Solver;
 pub enum Applied {
     /// The state or a parameter changed, or already was as the action asks.
     State,
-    /// A grab has a new target. The next keyframe can wait.
+    /// A grab has a new target, or a body its motion in the next step. The next keyframe can wait.
     Target,
     /// The next step shows a state that was put in place.
     InPlace,
@@ -89,6 +90,19 @@ impl Solver {
             }
             Action::MoveCollider { collider, translation, rotation } => {
                 self.move_collider(collider, Pose { translation, rotation })?;
+            }
+            Action::DriveBody {
+                collider,
+                translation,
+                rotation,
+                velocity,
+                angular_velocity,
+                force,
+                torque,
+            } => {
+                let motion = BodyMotion { velocity, angular_velocity, force, torque };
+                self.drive_body(collider, Pose { translation, rotation }, &motion)?;
+                return Ok(Applied::Target);
             }
             Action::Set { parameter, value, constraint_kind } => {
                 return self.apply_setting(parameter.as_str(), value, constraint_kind);

@@ -44,6 +44,7 @@ impl Publisher {
             process_id: std::process::id(),
             time_scale: position.time_scale,
             frozen_count: solver.frozen_count(),
+            standing_body_steps: solver.standing_body_steps(),
             torn_count: count(solver.torn().len()),
             flags: if position.is_paused { StatusFlags::PAUSED } else { 0 },
             ..NodeStatus::default()

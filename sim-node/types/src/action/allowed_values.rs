@@ -69,6 +69,10 @@ impl Action {
                 "coordinates within 1e7, rotation not 0; in 2-D, z 0 and a rotation about z; for \
                  bounds, no rotation"
             }
+            Self::DriveBody { .. } => {
+                "coordinates and velocity within 1e7, angular velocity within 1e4 rad/s, rotation not 0; in 2-D, \
+                 z 0 and rotations about z"
+            }
             Self::Load { .. } => "a scene that the node can read; see its messages",
             Self::Step { .. } => "1 or more",
             Self::Mark { .. } => "a text that is not empty",

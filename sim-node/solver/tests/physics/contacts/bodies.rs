@@ -288,7 +288,7 @@ fn a_body_without_a_command_stands_like_a_collider_and_is_counted() {
         assert_eq!(bits(&body), bits(&collider), "step {step}");
         assert_eq!(body.forces(), collider.forces());
     }
-    assert_eq!(body.standing_body_count(), 0, "never driven");
+    assert_eq!(body.standing_body_steps(), 0, "never driven");
     let mut peer = Peer::new(1.0, [0.004; 3], 240);
     peer.step(&mut body);
     let pose = Pose {
@@ -299,7 +299,7 @@ fn a_body_without_a_command_stands_like_a_collider_and_is_counted() {
         body.step();
         assert_eq!(body.colliders().next().unwrap().velocity, [0.0; 3]);
     }
-    assert_eq!(body.standing_body_count(), 5);
+    assert_eq!(body.standing_body_steps(), 5);
     let stands = Vec3::from_array(center(&body)) - Vec3::new(0.0, 0.11, 0.0);
     assert_eq!(stands.to_array(), pose.translation);
 }
