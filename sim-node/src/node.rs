@@ -222,6 +222,7 @@ impl Node {
                 continue;
             }
             self.publisher.phases.begin();
+            let was_stepping = self.progress.is_stepping();
             self.apply_commands(due.is_some(), stop)?;
             self.publisher.phases.end(Phase::Drain);
             if stop.is_requested() {
@@ -232,8 +233,11 @@ impl Node {
                 self.observe(&observer)?;
                 continue;
             }
+            // A resumed node first waits for the members, which it did not while paused.
+            let has_waited = was_stepping || !self.lockstep.has_members();
             if let Some(wake_late_ns) = due
                 && self.progress.is_stepping()
+                && has_waited
             {
                 if !self.make_step(wake_late_ns, stop)? {
                     break;

@@ -92,6 +92,35 @@ fn a_client_that_has_read_the_newest_snapshot_joins_and_takes_its_turn_at_it() {
 }
 
 #[test]
+fn a_resumed_node_waits_for_its_members_before_the_first_step() {
+    let sandbox = Sandbox::new();
+    let args = ["run", "curtain", "--paused", "--as-fast-as-possible"];
+    let _node = Process::start_ready(Program::SimNode, &sandbox, &args);
+    let mut client = Client::attach(&sandbox.endpoint()).unwrap();
+    client.join_lockstep(DEADLINE).unwrap();
+    ctl(&sandbox, &["resume"]);
+    for step in 0..3 {
+        let turn = *client.next_turn(DEADLINE).unwrap().unwrap().header();
+        assert_eq!(turn.step, step);
+        client.send(Action::Pin { particle: 30 }).unwrap();
+        client.ready().unwrap();
+        let outcome = client.next_outcome(DEADLINE).unwrap().unwrap();
+        assert_eq!(outcome.step, step + 1);
+    }
+    drop(client);
+    // A pause in between changes nothing.
+    ctl(&sandbox, &["pause"]);
+    let mut client = Client::attach(&sandbox.endpoint()).unwrap();
+    client.join_lockstep(DEADLINE).unwrap();
+    let step = ctl(&sandbox, &["hash"])["step"].as_u64().unwrap();
+    ctl(&sandbox, &["resume"]);
+    assert_eq!(client.next_turn(DEADLINE).unwrap().unwrap().header().step, step);
+    client.send(Action::Unpin { particle: 30 }).unwrap();
+    client.ready().unwrap();
+    assert_eq!(client.next_outcome(DEADLINE).unwrap().unwrap().step, step + 1);
+}
+
+#[test]
 fn the_same_controllers_give_the_same_hash_at_any_speed() {
     let expected = hash_with_controllers(0, &[]);
     for seed in 1..=10 {
