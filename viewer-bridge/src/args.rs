@@ -82,6 +82,10 @@ pub(crate) struct Args {
     /// commands. Pages always may
     #[arg(long, requires = "foxglove")]
     allow_commands: bool,
+    /// Scene file that pages can load beside the built-in scenes; can be repeated. The node reads it by its
+    /// absolute path
+    #[arg(long = "scene", value_name = "FILE.toml", conflicts_with = "replay")]
+    pub(crate) scenes: Vec<PathBuf>,
     /// Name of the node: its services are NAME/particles, NAME/commands, ...
     #[arg(long, default_value = NAME_DEFAULT, value_name = "NAME", value_parser = Endpoint::parse_name)]
     name: String,

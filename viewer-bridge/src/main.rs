@@ -18,6 +18,7 @@ use tokio::runtime;
 use tokio::signal::unix::{SignalKind, signal};
 use viewer_bridge::pages::assets::Assets;
 use viewer_bridge::request::{Requests, requests};
+use viewer_bridge::scene::catalog::Catalog;
 use viewer_bridge::source::live::Live;
 use viewer_bridge::source::replay::Replay;
 use viewer_bridge::{
@@ -80,10 +81,12 @@ fn run(args: &Args) -> anyhow::Result<()> {
 }
 
 fn open_source(args: &Args, stop: &Stop) -> anyhow::Result<Box<dyn Source>> {
-    Ok(match &args.replay {
-        Some(path) => Box::new(Replay::open(path, args.start(), stop, &mut note)?),
-        None => Box::new(Live::new(args.endpoint()?)),
-    })
+    if let Some(path) = &args.replay {
+        return Ok(Box::new(Replay::open(path, args.start(), stop, &mut note)?));
+    }
+    let mut catalog = Catalog::default();
+    args.scenes.iter().try_for_each(|path| catalog.add_file(path))?;
+    Ok(Box::new(Live::new(args.endpoint()?, catalog)))
 }
 
 /// Serves until a signal arrives or the source ends.
@@ -97,7 +100,7 @@ async fn serve(
     let server = Server::bind(options).await?;
     let (sender, requests) = requests();
     let shutdown = Shutdown::default();
-    let hub = Arc::new(Hub::new(source.mode(), sender.clone()));
+    let hub = Arc::new(Hub::new(source.mode(), source.scenes(), sender.clone()));
     let mut sinks = Sinks::new(shutdown.clone());
     sinks.add(Arc::<Hub>::clone(&hub));
     let foxglove = match foxglove {

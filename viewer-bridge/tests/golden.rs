@@ -18,7 +18,7 @@ use viewer_bridge::message::{
     Choice, FromPage, Hashes, Level, Mark, MarkKind, Mode, Node, NodeState, OutcomeText,
     PageLimits, ParametersText, Playback, Refusal, Status, Timeline, ToPage, Welcome,
 };
-use viewer_bridge::scene::catalog;
+use viewer_bridge::scene::catalog::Catalog;
 use viewer_bridge::wire::{
     Bounds, Colliders, Format, FrameHead, FrameLimits, Message, Percentiles, Pins, Scene,
     SceneText, Stamp, Statistics, Tear, decode, encode_frame, frame_flag, scene_flag,
@@ -321,7 +321,7 @@ fn to_page() -> Vec<ToPage> {
             client: 3,
             mode: Mode::Live,
             format: Choice::Auto,
-            scenes: catalog::all(),
+            scenes: Catalog::default().entries().to_vec(),
             limits: PageLimits::default(),
         })),
         ToPage::Node(Node { text: "no node runs".to_owned(), ..Node::default() }),

@@ -3,7 +3,7 @@
 
 use integration_tests::{DEADLINE, wait_for};
 use serde_json::json;
-use viewer_bridge::scene::catalog;
+use viewer_bridge::scene::catalog::Catalog;
 
 use crate::support::{Button, Rig};
 
@@ -42,16 +42,20 @@ fn the_page_opens_on_something_that_moves_with_a_hint_until_it_is_touched() {
 #[ignore = "needs Chromium"]
 fn every_scene_is_loaded_by_keys_and_from_the_menu_at_its_own_rate() {
     let mut rig = Rig::new(&["curtain"], "");
-    let scenes = catalog::all();
+    let catalog = Catalog::default();
+    let scenes = catalog.entries();
     let shown = |name: &str| format!("viewer.scene === '{name}' && viewer.frame >= 0");
     for scene in scenes.iter().skip(1).chain(scenes.first()) {
         rig.tab.key(']');
-        rig.tab.wait(&shown(scene.name));
+        rig.tab.wait(&shown(&scene.name));
         let status = rig.client().status(DEADLINE).unwrap().unwrap();
-        assert_eq!((status.scene_name().as_str(), status.rate_hz), (scene.name, scene.rate_hz));
+        assert_eq!(
+            (status.scene_name().as_str(), status.rate_hz),
+            (scene.name.as_str(), scene.rate_hz)
+        );
     }
     rig.tab.key('[');
-    rig.tab.wait(&shown(scenes.last().unwrap().name));
+    rig.tab.wait(&shown(&scenes.last().unwrap().name));
 
     rig.tab.key('m');
     rig.tab.wait(
@@ -60,11 +64,11 @@ fn every_scene_is_loaded_by_keys_and_from_the_menu_at_its_own_rate() {
     let texts = rig.tab.evaluate(
         "[...document.querySelectorAll('#scenes button')].map(one => one.querySelector('span').textContent)",
     );
-    assert_eq!(texts, json!(scenes.iter().map(|one| one.text).collect::<Vec<_>>()));
+    assert_eq!(texts, json!(scenes.iter().map(|one| &one.text).collect::<Vec<_>>()));
     // The card of the scene on show has the focus, and an arrow goes to the one before it.
     rig.tab.named_key("ArrowLeft");
-    let before = scenes[scenes.len() - 2].name;
-    assert_eq!(rig.tab.evaluate("document.activeElement.dataset.scene"), before);
+    let before = &scenes[scenes.len() - 2].name;
+    assert_eq!(rig.tab.evaluate("document.activeElement.dataset.scene"), json!(before));
     let card = "#scenes button[data-scene=ragdoll]";
     rig.tab.evaluate(&format!("document.querySelector('{card}').scrollIntoView()"));
     rig.tab.click(card);

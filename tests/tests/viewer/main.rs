@@ -239,10 +239,48 @@ fn the_scene_picker_lists_the_scenes_of_the_node() {
     let sandbox = Sandbox::new();
     let listed = Process::run(Program::SimNode, &sandbox, &["scenes", "--json"]).json();
     let listed: Vec<_> = listed.as_array().unwrap().iter().map(|one| &one["name"]).collect();
-    let known: Vec<_> =
-        viewer_bridge::scene::catalog::all().iter().map(|one| json!(one.name)).collect();
+    let catalog = viewer_bridge::scene::catalog::Catalog::default();
+    let known: Vec<_> = catalog.entries().iter().map(|one| json!(one.name)).collect();
     assert_eq!(listed, known.iter().collect::<Vec<_>>());
-    assert!(viewer_bridge::scene::catalog::all().iter().all(|one| !one.text.is_empty()));
+    assert!(catalog.entries().iter().all(|one| !one.text.is_empty()));
+}
+
+#[test]
+fn a_page_loads_a_scene_file_that_the_viewer_was_given_and_no_other() {
+    let sandbox = Sandbox::new();
+    let text = "version = 1\nname = \"dot\"\n[[particle]]\nposition = [0, 0, 0]\n";
+    let dot = sandbox.write("dot.toml", text);
+    let hidden = sandbox.write("hidden.toml", &text.replace("dot", "hidden"));
+    let _node = Process::start_ready(Program::SimNode, &sandbox, &["run", "rope"]);
+    let bridge = Bridge::start_with(&sandbox, &["--scene", &dot]);
+    let mut page = bridge.page();
+    let last = page.hello["scenes"].as_array().unwrap().last().unwrap().clone();
+    let entry = json!({ "name": "dot", "rate_hz": 240, "dimensions": 3, "text": dot });
+    assert_eq!(last, entry);
+    assert_eq!(page.scene().text.name, "rope");
+    page.applied(json!({ "type": "load", "scene": "dot" }));
+    assert_eq!(page.scene().text.name, "dot");
+    for scene in [&dot, &hidden, "hidden"] {
+        assert_eq!(page.rejected(json!({ "type": "load", "scene": scene })), "unknown_scene");
+    }
+}
+
+#[test]
+fn a_wrong_scene_file_ends_the_viewer_with_its_name_and_the_cure() {
+    let sandbox = Sandbox::new();
+    let wrong = sandbox.write("wrong.toml", "version = 1\nrate = 60\n");
+    let rope = sandbox.write("mine.toml", "version = 1\nname = \"rope\"\n");
+    let absent = sandbox.path("absent.toml");
+    for (file, problem) in [
+        (&wrong, "wrong.toml:2: rate: "),
+        (&rope, "there is a scene 'rope' already; give this one another `name`"),
+        (&absent, "cannot read the scene"),
+    ] {
+        let args = ["--listen", "127.0.0.1:0", "--scene", file];
+        let done = Process::run(Program::ViewerBridge, &sandbox, &args);
+        assert_eq!(done.code, Some(1), "{}", done.stderr);
+        assert!(done.stderr.contains(problem), "{}", done.stderr);
+    }
 }
 
 #[test]

@@ -18,6 +18,8 @@ pub(crate) struct Bridge {
 /// A connection to a bridge.
 pub(crate) struct Page {
     socket: WebSocket<TcpStream>,
+    /// The first message of the server.
+    pub(crate) hello: Value,
     /// Texts received while waiting for another message.
     texts: VecDeque<Value>,
     last_id: u32,
@@ -47,9 +49,10 @@ impl Bridge {
         stream.set_read_timeout(Some(DEADLINE)).unwrap();
         let url = format!("ws://{}/socket", self.host);
         let (socket, _) = tungstenite::client(url, stream).unwrap();
-        let mut page = Page { socket, texts: VecDeque::new(), last_id: 0 };
+        let mut page = Page { socket, hello: Value::Null, texts: VecDeque::new(), last_id: 0 };
         page.send(&json!({ "type": "hello", "protocol": 2, "format": "f32" }));
-        assert_eq!(page.text(|text| text["type"] == "hello")["protocol"], 2);
+        page.hello = page.text(|text| text["type"] == "hello");
+        assert_eq!(page.hello["protocol"], 2);
         page
     }
 }

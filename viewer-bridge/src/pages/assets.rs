@@ -91,7 +91,7 @@ mod tests {
     use std::collections::BTreeSet;
 
     use super::*;
-    use crate::scene::catalog;
+    use crate::scene::catalog::Catalog;
 
     fn status(assets: &Assets, path: &str) -> StatusCode {
         assets.answer(path, &HeaderMap::new()).status()
@@ -135,7 +135,7 @@ mod tests {
     fn every_built_in_scene_has_a_picture() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("web");
         for assets in [Assets::Embedded, Assets::folder(&folder).unwrap()] {
-            for scene in catalog::all() {
+            for scene in Catalog::default().entries() {
                 let path = format!("pictures/{}.png", scene.name);
                 let answer = assets.answer(&path, &HeaderMap::new());
                 assert_eq!(answer.status(), StatusCode::OK, "{path}");

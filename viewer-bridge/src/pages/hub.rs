@@ -19,7 +19,7 @@ use super::frame_set::{FrameSet, format_for};
 use crate::limits::{PROTOCOL, RELIABLE_QUEUED_MAX};
 use crate::message::{Choice, Level, Mode, PageLimits, ToPage, Welcome};
 use crate::request::{ClientId, RequestKind, RequestSender};
-use crate::scene::catalog;
+use crate::scene::catalog::SceneEntry;
 use crate::sink::{Demand, Sink, Torn, Update};
 use crate::wire::convert::count_u32;
 use crate::wire::{Statistics, Tear};
@@ -43,6 +43,7 @@ enum Slot {
 #[derive(Debug)]
 pub struct Hub {
     mode: Mode,
+    scenes: Vec<SceneEntry>,
     state: Mutex<HubState>,
     encoder: Mutex<FrameEncoder>,
     frames: watch::Sender<Arc<FrameSet>>,
@@ -97,10 +98,11 @@ fn text(message: &ToPage) -> Message {
 }
 
 impl Hub {
-    /// Creates a hub without pages. The requests of its pages go to `requests`.
-    pub fn new(mode: Mode, requests: RequestSender) -> Self {
+    /// Creates a hub without pages, which can load `scenes`. The requests of its pages go to `requests`.
+    pub fn new(mode: Mode, scenes: Vec<SceneEntry>, requests: RequestSender) -> Self {
         Self {
             mode,
+            scenes,
             state: Mutex::default(),
             encoder: Mutex::default(),
             frames: watch::Sender::default(),
@@ -196,17 +198,13 @@ impl Hub {
     }
 
     fn welcome(&self, client: u32, format: Choice) -> Welcome {
-        let scenes = match self.mode {
-            Mode::Live => catalog::all(),
-            Mode::Replay => Vec::new(),
-        };
         Welcome {
             protocol: PROTOCOL,
             version: env!("CARGO_PKG_VERSION"),
             client,
             mode: self.mode,
             format,
-            scenes,
+            scenes: self.scenes.clone(),
             limits: PageLimits::default(),
         }
     }

@@ -2,6 +2,7 @@
 
 use crate::message::Mode;
 use crate::request::Requests;
+use crate::scene::catalog::SceneEntry;
 use crate::sink::Sinks;
 use crate::source::recording_times::RecordingTimes;
 
@@ -9,6 +10,11 @@ use crate::source::recording_times::RecordingTimes;
 pub trait Source: Send {
     /// Kind of source.
     fn mode(&self) -> Mode;
+
+    /// The scenes that pages can load.
+    fn scenes(&self) -> Vec<SceneEntry> {
+        Vec::new()
+    }
 
     /// Times of the recording, if the source is one.
     fn recording(&self) -> Option<RecordingTimes> {

@@ -12,6 +12,7 @@ mod statistics;
 mod tests;
 mod updates;
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use sim_contract::clock::monotonic_ns;
@@ -21,6 +22,7 @@ use sim_contract::{AttachError, Endpoint};
 use super::feed::Source;
 use crate::message::{Mode, Node, NodeState, OutcomeText, ParametersText, Refusal};
 use crate::request::{RequestKind, Requests};
+use crate::scene::catalog::{Catalog, SceneEntry};
 use crate::sink::{Sinks, Update};
 use crate::source::shown_state::ShownState;
 use link::{Link, LinkEnd};
@@ -34,21 +36,23 @@ const SHUTDOWN_CHECK_PERIOD: Duration = Duration::from_millis(50);
 #[derive(Debug)]
 pub struct Live {
     endpoint: Endpoint,
+    catalog: Arc<Catalog>,
     shown: ShownState,
     /// The state of the node that was published last.
     node: Node,
 }
 
 impl Live {
-    /// Shows the node at this endpoint.
-    pub fn new(endpoint: Endpoint) -> Self {
-        Self { endpoint, shown: ShownState::default(), node: Node::default() }
+    /// Shows the node at this endpoint, which pages can let load the scenes of the catalog.
+    pub fn new(endpoint: Endpoint, catalog: Catalog) -> Self {
+        let catalog = Arc::new(catalog);
+        Self { endpoint, catalog, shown: ShownState::default(), node: Node::default() }
     }
 
     /// Waits for a node. Returns `None` if the program ends first.
     fn search(&mut self, sinks: &Sinks, requests: &Requests) -> Option<Link> {
         while !sinks.is_shutting_down() {
-            match Link::attach(&self.endpoint) {
+            match Link::attach(&self.endpoint, &self.catalog) {
                 Ok(link) => return Some(link),
                 Err(error) => self.publish_absence(sinks, &error),
             }
@@ -91,6 +95,10 @@ impl Live {
 impl Source for Live {
     fn mode(&self) -> Mode {
         Mode::Live
+    }
+
+    fn scenes(&self) -> Vec<SceneEntry> {
+        self.catalog.entries().to_vec()
     }
 
     fn run(&mut self, sinks: &Sinks, requests: &Requests) -> anyhow::Result<()> {

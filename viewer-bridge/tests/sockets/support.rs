@@ -18,6 +18,7 @@ use tungstenite::{Message, WebSocket};
 use viewer_bridge::message::Mode;
 use viewer_bridge::pages::assets::Assets;
 use viewer_bridge::request::{Requests, requests};
+use viewer_bridge::scene::catalog::Catalog;
 use viewer_bridge::sink::{State, Update};
 use viewer_bridge::source::shown_state::ShownState;
 use viewer_bridge::wire::{self, Scene, decode};
@@ -67,7 +68,10 @@ impl Site {
         let server = runtime.block_on(Server::bind(options)).unwrap();
         let (sender, requests) = requests();
         let shutdown = Shutdown::default();
-        let (hub, url) = (Arc::new(Hub::new(Mode::Live, sender)), server.url());
+        let (hub, url) = (
+            Arc::new(Hub::new(Mode::Live, Catalog::default().entries().to_vec(), sender)),
+            server.url(),
+        );
         let mut sinks = Sinks::new(shutdown.clone());
         sinks.add(Arc::<Hub>::clone(&hub));
         let port = url.rsplit(':').next().unwrap().split('/').next().unwrap();

@@ -5,12 +5,13 @@ use sim_contract::{Action, Parameter, ParameterValue, Reason, Text};
 use super::brush::Stroke;
 use super::command_context::CommandContext;
 use crate::message::{Command, Refusal};
-use crate::scene::catalog;
+use crate::scene::catalog::Catalog;
 
 /// Returns the actions of a command, in order. The list is empty if there is nothing to do.
 pub(super) fn actions(
     command: Command,
     context: CommandContext<'_>,
+    catalog: &Catalog,
 ) -> Result<Vec<Action>, Refusal> {
     if context.is_replay && changes_simulation(&command) {
         return Err(Refusal::OnlyLive);
@@ -51,11 +52,8 @@ pub(super) fn actions(
         }
         Command::Reset {} => Action::Reset,
         // A path would let anybody with the page read the files of the node's user.
-        Command::Load { scene } if !catalog::is_known(&scene) => {
-            return Err(Refusal::UnknownScene);
-        }
         Command::Load { scene } => {
-            Action::Load { scene: Text::new(&scene).map_err(|_| Reason::OutOfRange)? }
+            Action::Load { scene: catalog.source(&scene).ok_or(Refusal::UnknownScene)? }
         }
         Command::Mark { text } => {
             Action::Mark { text: Text::new(&text).map_err(|_| Reason::OutOfRange)? }

@@ -1,6 +1,7 @@
 //! Sends the clients' commands to the node, and the outcomes back.
 
 use std::collections::{BTreeMap, VecDeque};
+use std::sync::Arc;
 
 use sim_contract::clock::monotonic_ns;
 use sim_contract::{Action, Client, Outcome, Reason, RequestError};
@@ -10,12 +11,15 @@ use super::command_context::CommandContext;
 use crate::limits::{COMMANDS_QUEUED_MAX, GRABS_PER_CLIENT_MAX, OUTCOME_TIMEOUT};
 use crate::message::{Command, OutcomeText, Refusal, Status};
 use crate::request::ClientId;
+use crate::scene::catalog::Catalog;
 use crate::sink::{Sinks, Update};
 
 /// Open commands and grabs. The node sees all clients as one, so only the bridge knows which of them
 /// grabs a particle.
 #[derive(Debug, Default)]
 pub(super) struct Dispatch {
+    /// The scenes that clients can load.
+    catalog: Arc<Catalog>,
     /// Grabs by particle, including those that the node has not applied yet.
     grabs: BTreeMap<u32, GrabOwner>,
     /// Open commands by number, ascending in time.
@@ -63,6 +67,11 @@ struct PartOutcome {
 }
 
 impl Dispatch {
+    /// Clients can load the scenes of the catalog.
+    pub(super) fn new(catalog: Arc<Catalog>) -> Self {
+        Self { catalog, ..Self::default() }
+    }
+
     /// Accepts a command of a client. Returns the answer if it is known at once.
     pub(super) fn submit(
         &mut self,
@@ -72,7 +81,8 @@ impl Dispatch {
         context: CommandContext<'_>,
     ) -> Option<OutcomeText> {
         let kind = command.name();
-        match self.update_grabs(client, &command).and_then(|()| actions(command, context)) {
+        let parts = self.update_grabs(client, &command);
+        match parts.and_then(|()| actions(command, context, &self.catalog)) {
             Err(reason) => Some(OutcomeText::refused(id, kind, reason)),
             Ok(parts) if parts.is_empty() => id.map(|_| OutcomeText::pending(id, kind)),
             Ok(parts) => {

@@ -1,5 +1,6 @@
 //! The connection to one run of a node.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use recorder::{OutcomeRow, StatusRow, StepRow};
@@ -17,6 +18,7 @@ use super::updates::Updates;
 use crate::limits::{FRAMES_PER_SECOND_MAX, RELEASE_TIMEOUT};
 use crate::message::{Node, ParametersText};
 use crate::request::{Request, RequestKind, Requests};
+use crate::scene::catalog::Catalog;
 use crate::sink::{Demand, Sinks, State, Update};
 use crate::source::shown_state::ShownState;
 use crate::wire::frame_flag;
@@ -72,7 +74,7 @@ pub(super) struct Link {
 }
 
 impl Link {
-    pub(super) fn attach(endpoint: &Endpoint) -> Result<Self, AttachError> {
+    pub(super) fn attach(endpoint: &Endpoint, catalog: &Arc<Catalog>) -> Result<Self, AttachError> {
         Ok(Self {
             tap: Tap::attach(endpoint)?,
             client: Client::attach(endpoint)?,
@@ -81,7 +83,7 @@ impl Link {
             status: None,
             parameters: None,
             published_parameters: None,
-            dispatch: Dispatch::default(),
+            dispatch: Dispatch::new(Arc::clone(catalog)),
             shown_id: None,
             next_frame_ns: 0,
             next_owner_check_ns: 0,

@@ -65,9 +65,9 @@ impl Fixture {
     fn start() -> Self {
         let domain = TestDomain::new();
         let owner = Owner::create(&domain.endpoint(), &load(0, 0)).unwrap();
-        let link = Link::attach(&domain.endpoint()).unwrap();
+        let link = Link::attach(&domain.endpoint(), &Arc::default()).unwrap();
         let (sender, requests) = requests();
-        let hub = Arc::new(Hub::new(Mode::Live, sender));
+        let hub = Arc::new(Hub::new(Mode::Live, Vec::new(), sender));
         let page = hub.join(Choice::F32);
         let (shown, mut sinks) = (ShownState::default(), Sinks::default());
         sinks.add(Arc::<Hub>::clone(&hub));
