@@ -17,6 +17,9 @@ struct Peer {
     velocity: DVec3,
     spin: DVec3,
     gravity: DVec3,
+    /// Beside gravity and the impulses of the particles.
+    force: DVec3,
+    torque: DVec3,
     dt: f64,
 }
 
@@ -30,6 +33,8 @@ impl Peer {
             velocity: DVec3::ZERO,
             spin: DVec3::ZERO,
             gravity: GRAVITY,
+            force: DVec3::ZERO,
+            torque: DVec3::ZERO,
             dt: 1.0 / f64::from(rate_hz),
         }
     }
@@ -43,16 +48,17 @@ impl Peer {
         let motion = BodyMotion {
             velocity: self.velocity.as_vec3().to_array(),
             angular_velocity: self.spin.as_vec3().to_array(),
-            ..BodyMotion::default()
+            force: self.force.as_vec3().to_array(),
+            torque: self.torque.as_vec3().to_array(),
         };
         solver.drive_body(0, pose, &motion).unwrap();
         solver.step();
         let row = solver.forces().unwrap().colliders[0].impulse;
         let impulse = vector(row.linear);
         let before = self.velocity;
-        self.velocity += self.gravity * self.dt + impulse / self.mass;
+        self.velocity += (self.gravity + self.force / self.mass) * self.dt + impulse / self.mass;
         self.position += (before + self.velocity) * (0.5 * self.dt);
-        self.turn(vector(row.angular));
+        self.turn(vector(row.angular) + self.torque * self.dt);
         impulse
     }
 
@@ -248,6 +254,66 @@ fn a_ball_that_falls_on_a_pinned_particle_lands_as_on_a_rigid_floor() {
         assert_near("height", -0.2, peer.position.y, 1e-3);
         let impulse = peer.step(&mut solver);
         assert_close("weight", 3.0 * 9.81 / 240.0, impulse.y, 1e-2);
+    }
+}
+
+#[test]
+fn a_plank_on_two_ropes_tilts_under_a_ball_and_loads_them_by_the_law_of_the_lever() {
+    // The ropes lie along z, at x = -0.3 and x = 0.3. The plank lies across them. Its engine lets a ball of 1 kg
+    // roll on it, which is a force and a torque for the particles.
+    let rope = |x: f32| {
+        format!(
+            "[[generate]]\nshape = \"rope\"\ncount = 25\nmass = 0.01\npinned = \"both\"\n\
+             compliance = {{ structural = 1e-4 }}\n\
+             from = [{x}, 0, -0.6]\nto = [{x}, 0, 0.6]\n"
+        )
+    };
+    let text = format!(
+        "{}damping = 4\n{}{}[[collider]]\nshape = \"box\"\ncenter = [0, 0.021, 0]\nfriction = 1\n\
+         half_extents = [0.5, 0.02, 0.2]\nbody = {{ mass = 2, inertia = [0.027, 0.19, 0.167] }}\n",
+        rates(240, 16),
+        rope(-0.3),
+        rope(0.3)
+    );
+    let mut solver = measured(&text);
+    let mut plank = Peer::new(2.0, [0.027, 0.19, 0.167], 240);
+    let weight = 9.81;
+    let mut tilt_before = f64::NEG_INFINITY;
+    for ball in [-0.2, 0.0, 0.2] {
+        // Slowly to the place, then it waits.
+        let start = plank.torque.z / -weight;
+        let mut supports = [0.0; 2];
+        let mut torque = 0.0;
+        for step in 0..240 * 12 {
+            let share = f64::min(f64::from(step) / (240.0 * 4.0), 1.0);
+            let at = start + (ball - start) * share;
+            plank.force = DVec3::new(0.0, -weight, 0.0);
+            plank.torque = DVec3::new(0.0, 0.0, -at * weight);
+            // Some friction of the engine's own, so that the plank settles.
+            plank.velocity *= 1.0 - 2.0 / 240.0;
+            plank.spin *= 1.0 - 2.0 / 240.0;
+            plank.step(&mut solver);
+            if step >= 240 * 10 {
+                let forces = solver.forces().unwrap();
+                torque += f64::from(forces.colliders[0].impulse.angular[2]) / 2.0;
+                for row in &forces.particles {
+                    supports[usize::from(row.particle >= 25)] -= f64::from(row.impulse[1]) / 2.0;
+                }
+            }
+        }
+        assert_near("torque", ball * weight, torque, 0.02 * weight * 0.2);
+        // Each rope carries itself, half of the plank, and its share of the ball.
+        for (side, support) in [(-1.0, supports[0]), (1.0, supports[1])] {
+            let share = 0.5 + side * ball / 0.6;
+            let expected = 0.23 * 9.81 + 9.81 + share * weight;
+            assert_close(&format!("rope {side} with the ball at {ball}"), expected, support, 2e-2);
+        }
+        let tilt = -2.0 * plank.rotation.z;
+        assert!(tilt > tilt_before + 0.01, "{tilt} at {ball} after {tilt_before}");
+        tilt_before = tilt;
+        if ball == 0.0 {
+            assert_near("level", 0.0, tilt, 2e-3);
+        }
     }
 }
 
