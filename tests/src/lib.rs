@@ -15,7 +15,7 @@ mod wait;
 
 pub use finished::Finished;
 pub use process::{Process, allow_many_open_files, ctl, record};
-pub use programs::{Program, build_products};
+pub use programs::{Program, build_products, build_products_and_bodies};
 pub use rustix::process::Signal;
 pub use sandbox::Sandbox;
 pub use streams::{Stream, Streams};

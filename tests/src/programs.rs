@@ -33,6 +33,8 @@ pub enum Program {
     Grab,
     /// The contract's example that controls a pendulum in lockstep.
     Hold,
+    /// The example with rigid bodies of another engine.
+    Bodies,
     /// The example in C, compiled by its test and linked with the shared library.
     PullCorner,
     /// The same, linked with the static library.
@@ -69,6 +71,7 @@ impl Program {
             Self::Watch => built().join("examples/watch"),
             Self::Grab => built().join("examples/grab"),
             Self::Hold => built().join("examples/hold"),
+            Self::Bodies => built().join("examples/bodies"),
             Self::PullCorner => built().join("pull_corner"),
             Self::PullCornerStatic => built().join("pull_corner_static"),
             Self::HoldInCpp => built().join("hold"),
@@ -99,6 +102,16 @@ fn built() -> &'static Path {
 /// If a program does not build.
 pub fn build_products() {
     FOLDER.get_or_init(|| build(&["-p", "sim-node", "-p", "recorder", "-p", "viewer-bridge"]));
+}
+
+/// Does the same, and builds the example with rigid bodies.
+///
+/// # Panics
+/// If a program does not build.
+pub fn build_products_and_bodies() {
+    let selection = ["-p", "sim-node", "-p", "recorder", "-p", "viewer-bridge"];
+    let example = ["-p", "integration-tests", "--bins", "--example", "bodies"];
+    FOLDER.get_or_init(|| build(&[&selection[..], &example].concat()));
 }
 
 #[allow(clippy::disallowed_methods, reason = "the harness starts processes")]

@@ -22,7 +22,7 @@ const ARROWS: [(&str, &[&str]); 10] = [
     ("sim-node", &["sim-cli", "sim-contract", "sim-lessons", "sim-solver"]),
     ("recorder", &["mcap", "sim-cli", "sim-contract", "sim-solver"]),
     ("viewer-bridge", &["foxglove", "recorder", "sim-cli", "sim-contract", "sim-solver"]),
-    ("integration-tests", &["recorder", "sim-contract", "viewer-bridge"]),
+    ("integration-tests", &["recorder", "sim-contract", "sim-solver", "viewer-bridge"]),
 ];
 
 /// Limit on the lines of a source file: a longer one holds more than one concept.

@@ -1,7 +1,8 @@
 //! `cargo demo`: runs a node, a recorder and a viewer as processes until Ctrl-C, then describes the
 //! recording.
 //!
-//! Open the printed address in a browser and drag the curtain.
+//! Open the printed address in a browser and drag the curtain. With `--bodies`, the node starts with the scene of
+//! the example `bodies`, whose process moves the rigid bodies.
 #![forbid(unsafe_code)]
 
 use std::io::{Write, stderr};
@@ -10,7 +11,7 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use anyhow::{Context, bail};
-use integration_tests::{Finished, Process, Program, build_products};
+use integration_tests::{Finished, Process, Program, build_products, build_products_and_bodies};
 use sim_contract::clock::{SECOND_NS, realtime_ns};
 use sim_contract::console::{note, write_result};
 use sim_contract::{Client, DOMAIN_VARIABLE, Endpoint, Stop};
@@ -22,7 +23,10 @@ const POLL: Duration = Duration::from_millis(200);
 const HELP: &str =
     "Run a node with the curtain scene, a recorder and a viewer until Ctrl-C, then describe the recording.
 
-Usage: cargo demo
+Usage: cargo demo [--bodies]
+
+Options:
+  --bodies  start with rigid bodies of another process in a net; the menu of scenes has them, too
 
 Open the printed address in a browser and drag the curtain. Set CATENARY_DOMAIN to separate the demo
 from other nodes on this host. The recording goes to the temporary folder.";
@@ -43,27 +47,38 @@ fn main() -> ExitCode {
 }
 
 fn run() -> anyhow::Result<()> {
-    match std::env::args().nth(1).as_deref() {
-        None => {}
+    let has_bodies = match std::env::args().nth(1).as_deref() {
+        None => false,
+        Some("--bodies") => true,
         Some("--help" | "-h") => {
             return result(&format!("{HELP}\n"));
         }
         Some(other) => bail!("unexpected argument '{other}'\n\n{HELP}"),
-    }
+    };
     let stop = Stop::install()?;
     let domain = std::env::var(DOMAIN_VARIABLE).unwrap_or_default();
-    let file =
-        std::env::temp_dir().join(format!("catenary-demo-{}.mcap", realtime_ns() / SECOND_NS));
+    let (seconds, process) = (realtime_ns() / SECOND_NS, std::process::id());
+    let file = std::env::temp_dir().join(format!("catenary-demo-{seconds}-{process}.mcap"));
     let file = file.to_str().context("the temporary folder's path is not UTF-8")?;
 
     note("building the programs");
-    build_products();
+    if has_bodies {
+        build_products_and_bodies();
+    } else {
+        build_products();
+    }
     note("starting the node");
-    let mut node = Process::start_in(Program::SimNode, &domain, &["run", "curtain"]);
+    let scene = has_bodies.then(bodies_scene).transpose()?;
+    let run = ["run", scene.as_deref().unwrap_or("curtain")];
+    let mut node = Process::start_in(Program::SimNode, &domain, &run);
     node.wait_until_ready();
+    let mut bodies = has_bodies.then(|| Process::start_in(Program::Bodies, &domain, &[]));
+    if let Some(bodies) = &mut bodies {
+        bodies.wait_until_ready();
+    }
     let mut recorder = Process::start_in(Program::Recorder, &domain, &["record", "-o", file]);
     recorder.wait_until_ready();
-    let mut viewer = start_viewer(&domain);
+    let mut viewer = start_viewer(&domain, scene.as_deref());
     let url = viewer.wait_for_line("ready ");
     // A recording begins with a keyframe, which arrives a moment after the recorder is ready. Ctrl-C
     // before that would leave nothing to describe.
@@ -74,6 +89,9 @@ fn run() -> anyhow::Result<()> {
     show_progress(&stop, &mut node, &domain)?;
     let recorded = recorder.interrupt();
     let shown = viewer.interrupt();
+    if let Some(bodies) = bodies {
+        note(bodies.interrupt().stderr.trim_end());
+    }
     let ended = node.interrupt();
     note(format!("{}{}{}", recorded.stderr, shown.stderr, ended.stderr).trim_end());
     // Exit code 3 means that the recording has gaps; the recorder has reported them.
@@ -93,11 +111,20 @@ fn result(text: &str) -> anyhow::Result<()> {
     write_result(text.as_bytes()).context("cannot write to stdout")
 }
 
-/// Starts the viewer, on a free port if the usual one is in use.
-fn start_viewer(domain: &str) -> Process {
+/// Returns the scene of the example `bodies`.
+fn bodies_scene() -> anyhow::Result<String> {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples/bodies/bodies.toml");
+    let path = std::fs::canonicalize(path).context(path)?;
+    Ok(path.to_str().context("the path of the repository is not UTF-8")?.to_owned())
+}
+
+/// Starts the viewer, on a free port if the usual one is in use. Its menu has the built-in scenes, and `scene`.
+fn start_viewer(domain: &str, scene: Option<&str>) -> Process {
     let is_free = TcpListener::bind(LISTEN).is_ok();
     let listen = if is_free { LISTEN } else { LISTEN_ANYWHERE };
-    Process::start_in(Program::ViewerBridge, domain, &["--listen", listen])
+    let mut args = vec!["--listen", listen];
+    args.extend(scene.iter().flat_map(|scene| ["--scene", scene]));
+    Process::start_in(Program::ViewerBridge, domain, &args)
 }
 
 /// Shows the progress of the node until Ctrl-C, or until the node ends.
