@@ -2,9 +2,9 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { niceFloor } from "../js/geometry/round.js";
-import { ForceScale, arrowsOf } from "../js/state/forces.js";
-import { Simulation } from "../js/state/simulation.js";
+import { niceFloor } from "../../js/geometry/round.js";
+import { ForceScale, arrowsOf } from "../../js/state/forces.js";
+import { Simulation } from "../../js/state/simulation.js";
 
 const collider = (index, shape, rest) => ({
   index, shape, restitution: 0, friction: 0, radius: 0.5, offset: 0, normal: [0, 1, 0], center: [0, 0, 0], halfExtents: [1, 1, 1],
