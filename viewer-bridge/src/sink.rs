@@ -7,7 +7,7 @@ use std::fmt::Debug;
 use std::sync::Arc;
 
 use recorder::{OutcomeRow, StatusRow, StepRow};
-use sim_contract::{ConstraintState, LoadHeader, ParticleState, TornConstraint, Triangle};
+use sim_contract::{ConstraintState, Forces, LoadHeader, ParticleState, TornConstraint, Triangle};
 
 use crate::message::{Level, Node, OutcomeText, ParametersText, Playback, Timeline};
 use crate::request::ClientId;
@@ -108,6 +108,8 @@ pub struct State<'a> {
     pub publish_monotonic_ns: u64,
     /// The particles.
     pub particles: &'a [ParticleState],
+    /// The forces of the step, if they were read.
+    pub forces: Option<&'a Forces>,
 }
 
 /// Something that a source computes only if a client wants it.
@@ -117,6 +119,8 @@ pub enum Demand {
     State,
     /// Statistics.
     Statistics,
+    /// The forces of each step.
+    Forces,
 }
 
 /// A protocol that shows a simulation to its clients.

@@ -6,6 +6,7 @@ pub(crate) mod convert;
 mod cursor;
 mod decode;
 mod decode_error;
+mod forces;
 mod frame;
 mod header;
 mod scene;
@@ -15,6 +16,7 @@ mod writer;
 
 pub use decode::{Message, decode};
 pub use decode_error::DecodeError;
+pub use forces::Forces;
 pub use frame::{
     Bounds, Format, Frame, FrameHead, FrameLimits, encode as encode_frame, frame_flag,
 };

@@ -10,8 +10,8 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 use sim_contract::{
-    ColliderShape, ColliderState, ConstraintState, ParameterValues, ParticleFlags, ParticleState,
-    Reason, Triangle,
+    ColliderShape, ColliderState, ConstraintState, ForceKind, ForceRow, ParameterValues,
+    ParticleFlags, ParticleState, Reason, Triangle,
 };
 use sim_solver::scene::ColliderMesh;
 use viewer_bridge::message::{
@@ -20,7 +20,7 @@ use viewer_bridge::message::{
 };
 use viewer_bridge::scene::catalog::Catalog;
 use viewer_bridge::wire::{
-    Bounds, Colliders, Format, FrameHead, FrameLimits, Message, Percentiles, Pins, Scene,
+    Bounds, Colliders, Forces, Format, FrameHead, FrameLimits, Message, Percentiles, Pins, Scene,
     SceneText, Stamp, Statistics, Tear, decode, encode_frame, frame_flag, scene_flag,
 };
 
@@ -131,6 +131,25 @@ fn colliders() -> Colliders {
     Colliders { stamp: STAMP, colliders: vec![ball, floor, mesh] }
 }
 
+fn forces() -> Forces {
+    let collider = ForceRow {
+        kind: ForceKind::Collider as u32,
+        impulse: [0.0, -0.25, 0.5],
+        angular_impulse: [1.0, 2.0, 3.0],
+        contacts: 4,
+        ..ForceRow::default()
+    };
+    let other = |kind, index, impulse| ForceRow {
+        kind: kind as u32,
+        index,
+        impulse,
+        ..ForceRow::default()
+    };
+    let anchor = other(ForceKind::Anchor, 1, [0.5, 0.0, 0.0]);
+    let pin = other(ForceKind::Particle, 2, [0.0, -0.125, 0.0]);
+    Forces { stamp: STAMP, rate_hz: 240, rows: vec![collider, anchor, pin] }
+}
+
 /// All binary messages, by name.
 fn messages() -> Vec<(&'static str, Vec<u8>)> {
     let finite = &particles()[..3];
@@ -156,6 +175,7 @@ fn messages() -> Vec<(&'static str, Vec<u8>)> {
         ("pins", pins.encode().to_vec()),
         ("statistics", statistics().encode().to_vec()),
         ("colliders", colliders().encode().to_vec()),
+        ("forces", forces().encode().to_vec()),
     ]
 }
 
@@ -217,6 +237,14 @@ fn fields(message: &Message) -> Value {
                 "velocity": one.velocity, "angular_velocity": one.angular_velocity,
             })).collect::<Vec<_>>(),
         }),
+        Message::Forces(all) => json!({
+            "kind": 8, "epoch": all.stamp.epoch, "step": all.stamp.step,
+            "rate_hz": all.rate_hz,
+            "rows": all.rows.iter().map(|row| json!({
+                "kind": row.kind, "index": row.index, "impulse": row.impulse,
+                "angular_impulse": row.angular_impulse, "contacts": row.contacts,
+            })).collect::<Vec<_>>(),
+        }),
     }
 }
 
@@ -252,6 +280,7 @@ fn the_bytes_of_every_message_are_frozen() {
 fn every_message_decodes_to_what_was_encoded() {
     assert_eq!(decode(&scene().encode()), Ok(Message::Scene(scene())));
     assert_eq!(decode(&colliders().encode()), Ok(Message::Colliders(colliders())));
+    assert_eq!(decode(&forces().encode()), Ok(Message::Forces(forces())));
     let decoded = decode(&statistics().encode());
     assert_eq!(decoded, Ok(Message::Statistics(Box::new(statistics()))));
     for (name, bytes) in messages() {
@@ -386,10 +415,11 @@ fn to_page_of_a_replay() -> Vec<ToPage> {
 }
 
 /// One message of each kind that a page may send.
-const FROM_PAGE: [&str; 26] = [
+const FROM_PAGE: [&str; 27] = [
     r#"{"type":"hello","protocol":2,"token":"00","format":"u16"}"#,
     r#"{"type":"hello","protocol":2}"#,
     r#"{"type":"ack","frame":77}"#,
+    r#"{"type":"forces","is_on":true}"#,
     r#"{"type":"grab","particle":90,"target":[0.5,0.2,0.3],"over_s":0.05,"id":1}"#,
     r#"{"type":"move","particle":90,"target":[0.5,0.4,0.3]}"#,
     r#"{"type":"release","particle":90}"#,

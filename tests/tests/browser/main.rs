@@ -10,6 +10,7 @@
 
 mod access;
 mod first_minute;
+mod forces;
 mod pages;
 mod picture;
 mod pointer;

@@ -37,7 +37,7 @@ impl Sink for FoxgloveSink {
     fn has_demand(&self, demand: Demand) -> bool {
         match demand {
             Demand::State => self.publisher.is_state_awaited(),
-            Demand::Statistics => false,
+            Demand::Statistics | Demand::Forces => false,
         }
     }
 

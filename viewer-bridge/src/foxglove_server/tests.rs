@@ -95,6 +95,7 @@ impl Bench {
             flags: 0,
             publish_monotonic_ns: 0,
             particles: &[ParticleState::default(); 2],
+            forces: None,
         };
         self.publisher.publish_state_at(now_ns, &state);
     }

@@ -16,6 +16,11 @@ pub enum FromPage {
         /// Number of the frame.
         frame: u32,
     },
+    /// The page wants the forces of each frame, or no longer.
+    Forces {
+        /// `true` if it wants them.
+        is_on: bool,
+    },
     /// A command.
     Command {
         /// The page's number for the command. A command with a number is always answered.
@@ -203,6 +208,12 @@ struct Ack {
     frame: u32,
 }
 
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ForcesWish {
+    is_on: bool,
+}
+
 impl FromPage {
     /// Decodes a message from the bytes of a text.
     ///
@@ -223,6 +234,7 @@ impl FromPage {
         match fields.get("type").and_then(Value::as_str) {
             Some("hello") => untagged(fields).map(Self::Hello),
             Some("ack") => untagged(fields).map(|Ack { frame }| Self::Ack { frame }),
+            Some("forces") => untagged(fields).map(|ForcesWish { is_on }| Self::Forces { is_on }),
             _ => {
                 let id = fields.remove("id").map(from_value).transpose()?;
                 Ok(Self::Command { id, command: from_value(Value::Object(fields))? })
@@ -265,6 +277,8 @@ mod tests {
             r#"{"type":"pin","particle":1,"id":-1}"#,
             r#"{"type":"pin","particle":1,"id":"a"}"#,
             r#"{"type":"ack","frame":1,"id":1}"#,
+            r#"{"type":"forces"}"#,
+            r#"{"type":"forces","is_on":1}"#,
             r#"{"type":"hello"}"#,
             r#"{"type":"hello","protocol":1,"colour":2}"#,
             r#"{"type":"hello","protocol":1,"format":"f64"}"#,

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use axum::extract::ws::Message;
 use bytes::Bytes;
@@ -32,12 +32,14 @@ impl Credit {
 /// A page that has joined.
 #[derive(Debug)]
 pub(crate) struct Connection {
-    pub(super) client: ClientId,
+    pub(crate) client: ClientId,
     pub(super) choice: Choice,
     /// Reliable messages. The queue ends when the hub gives the page up.
     pub(crate) queue: mpsc::Receiver<Message>,
     pub(crate) frames: watch::Receiver<Arc<FrameSet>>,
     pub(super) credit: Arc<Credit>,
+    /// The page has asked for forces.
+    pub(super) wants_forces: Arc<AtomicBool>,
     pub(super) sent: SentFrames,
 }
 
@@ -54,8 +56,8 @@ pub(super) struct SentFrames {
 
 /// Messages for a page that show the newest frame.
 #[derive(Debug)]
-pub(super) enum NextFrame {
-    /// The frame, after the colliders if they have changed.
+pub(crate) enum NextFrame {
+    /// The frame, after the colliders if they have changed, and the forces if the page wants them.
     Frame(Vec<Bytes>),
     /// The page has received it before.
     Nothing,
@@ -65,7 +67,7 @@ pub(super) enum NextFrame {
 
 /// Effect of an acknowledgement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Acknowledged {
+pub(crate) enum Acknowledged {
     /// The page had no credit and has some now.
     CreditRestored,
     /// The page had credit before, or still has none.
@@ -74,7 +76,7 @@ pub(super) enum Acknowledged {
 
 impl Connection {
     /// Returns the newest frame for the page. Reports a missed frame once.
-    pub(super) fn next_frame(&mut self) -> NextFrame {
+    pub(crate) fn next_frame(&mut self) -> NextFrame {
         let frame = Arc::clone(&self.frames.borrow_and_update());
         let encoded = match format_for(self.choice, frame.particle_count) {
             Format::F32 => &frame.f32,
@@ -86,12 +88,15 @@ impl Connection {
         }
         sent.newest = Some(frame.number);
         let Some(encoded) = encoded else { return NextFrame::Missed };
-        let mut messages = Vec::with_capacity(2);
+        let mut messages = Vec::with_capacity(3);
         if let Some(colliders) = &frame.colliders
             && sent.colliders != Some(colliders.number)
         {
             sent.colliders = Some(colliders.number);
             messages.push(colliders.bytes.clone());
+        }
+        if self.wants_forces.load(Ordering::Relaxed) {
+            messages.extend(frame.forces.clone());
         }
         messages.push(encoded.clone());
         sent.unacknowledged.push_back(frame.number);
@@ -99,8 +104,13 @@ impl Connection {
         NextFrame::Frame(messages)
     }
 
+    /// Notes that the page wants forces, or no longer.
+    pub(crate) fn set_wants_forces(&self, is_on: bool) {
+        self.wants_forces.store(is_on, Ordering::Relaxed);
+    }
+
     /// Notes that the page has drawn a frame.
-    pub(super) fn acknowledge(&mut self, frame: u32) -> Acknowledged {
+    pub(crate) fn acknowledge(&mut self, frame: u32) -> Acknowledged {
         let had_credit = self.credit.is_left();
         let unacknowledged = &mut self.sent.unacknowledged;
         while unacknowledged.front().is_some_and(|sent| *sent <= frame) {

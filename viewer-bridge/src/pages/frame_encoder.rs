@@ -1,11 +1,12 @@
 //! Encodes states for the pages, once per format, and measures the cost.
 
+use bytes::Bytes;
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
 
 use super::frame_set::{ColliderSet, Formats, FrameSet};
 use crate::sink::State;
 use crate::wire::convert::{microseconds, to_f32};
-use crate::wire::{Colliders, Format, FrameHead, FrameLimits, Scene, Stamp, encode_frame};
+use crate::wire::{Colliders, Forces, Format, FrameHead, FrameLimits, Scene, Stamp, encode_frame};
 
 /// Encodes states for the pages.
 #[derive(Debug, Default)]
@@ -65,6 +66,7 @@ impl FrameEncoder {
             f32: formats.f32.then(|| encode(Format::F32)),
             u16: formats.u16.then(|| encode(Format::U16)),
             colliders: self.colliders.clone(),
+            forces: state.forces.map(|forces| encode_forces(head.stamp, forces)),
         };
         self.cost.encode_ns += monotonic_ns().saturating_sub(begin_ns);
         self.cost.frame_count += 1;
@@ -83,4 +85,8 @@ impl FrameEncoder {
             frames_per_second: to_f32(count / elapsed_s.max(1e-9)),
         }
     }
+}
+
+fn encode_forces(stamp: Stamp, forces: &sim_contract::Forces) -> Bytes {
+    Forces { stamp, rate_hz: forces.header.rate_hz, rows: forces.rows.clone() }.encode()
 }

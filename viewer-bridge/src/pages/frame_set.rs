@@ -19,6 +19,8 @@ pub(crate) struct FrameSet {
     pub(crate) u16: Option<Bytes>,
     /// The colliders of the load, if it has any.
     pub(crate) colliders: Option<ColliderSet>,
+    /// FORCES of the same step, if they were read.
+    pub(crate) forces: Option<Bytes>,
 }
 
 /// The colliders of a state.

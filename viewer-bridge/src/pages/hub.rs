@@ -6,6 +6,7 @@
 //! empties its queue before it sends a frame. Therefore no frame arrives before its scene.
 
 use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use axum::extract::ws::Message;
@@ -63,6 +64,7 @@ struct Page {
     queue: mpsc::Sender<Message>,
     choice: Choice,
     credit: Arc<Credit>,
+    wants_forces: Arc<AtomicBool>,
 }
 
 impl HubState {
@@ -187,14 +189,17 @@ impl Hub {
             // The queue has room for all of them.
             let _queued = queue.try_send(message.clone());
         }
-        state.pages.insert(client, Page { queue, choice, credit: Arc::clone(&credit) });
+        let wants_forces = Arc::new(AtomicBool::new(false));
+        let (seen_credit, seen_wish) = (Arc::clone(&credit), Arc::clone(&wants_forces));
+        let page = Page { queue, choice, credit: seen_credit, wants_forces: seen_wish };
+        state.pages.insert(client, page);
         state.queue_count();
         drop(state);
         let mut frames = self.frames.subscribe();
         frames.mark_unchanged();
         self.request(client, RequestKind::State);
         let sent = SentFrames::default();
-        Connection { client, choice, queue: receiver, frames, credit, sent }
+        Connection { client, choice, queue: receiver, frames, credit, wants_forces, sent }
     }
 
     fn welcome(&self, client: u32, format: Choice) -> Welcome {
@@ -210,7 +215,7 @@ impl Hub {
     }
 
     /// Removes a page.
-    pub(super) fn leave(&self, client: ClientId) {
+    pub(crate) fn leave(&self, client: ClientId) {
         let mut state = lock(&self.state);
         state.pages.remove(&client);
         state.queue_count();
@@ -235,6 +240,10 @@ impl Sink for Hub {
         match demand {
             Demand::State => lock(&self.state).pages.values().any(|page| page.credit.is_left()),
             Demand::Statistics => self.client_count() > 0,
+            Demand::Forces => {
+                let wants = |page: &Page| page.wants_forces.load(Ordering::Relaxed);
+                lock(&self.state).pages.values().any(wants)
+            }
         }
     }
 

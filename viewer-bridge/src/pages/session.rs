@@ -164,6 +164,11 @@ fn accept(message: &Message, hub: &Hub, connection: &mut Connection) -> Result<(
                 hub.request(connection.client, RequestKind::Credit);
             }
         }
+        FromPage::Forces { is_on } => {
+            connection.set_wants_forces(is_on);
+            // The state on show can have forces that this page has not received.
+            hub.request(connection.client, RequestKind::State);
+        }
         FromPage::Command { id, command } => submit(hub, connection.client, id, command),
         FromPage::Hello(_) => return Err(End::closed(MALFORMED, "hello was sent twice")),
     }

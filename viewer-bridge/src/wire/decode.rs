@@ -2,6 +2,7 @@
 
 use super::cursor::Cursor;
 use super::decode_error::DecodeError;
+use super::forces::Forces;
 use super::frame::{self, Format, Frame};
 use super::header::{KIND_VERSION, Kind, Stamp};
 use super::scene::Scene;
@@ -23,6 +24,8 @@ pub enum Message {
     Statistics(Box<Statistics>),
     /// All colliders.
     Colliders(Colliders),
+    /// The impulses of a step.
+    Forces(Forces),
 }
 
 /// Decodes one message.
@@ -52,6 +55,8 @@ pub fn decode(bytes: &[u8]) -> Result<Message, DecodeError> {
         Message::Statistics(Box::new(Statistics::decode(stamp, &mut cursor)?))
     } else if is(Kind::Colliders) {
         Message::Colliders(Colliders::decode(stamp, &mut cursor)?)
+    } else if is(Kind::Forces) {
+        Message::Forces(Forces::decode(stamp, &mut cursor)?)
     } else {
         return Err(unknown);
     };

@@ -21,6 +21,8 @@ pub enum Kind {
     Stats = 6,
     /// All colliders.
     Colliders = 7,
+    /// The impulses of a step.
+    Forces = 8,
 }
 
 /// Load and step that a message belongs to.

@@ -170,6 +170,7 @@ pub(crate) fn state(step: u64, particles: &[ParticleState]) -> State<'_> {
         flags: 0,
         publish_monotonic_ns: 0,
         particles,
+        forces: None,
     }
 }
 

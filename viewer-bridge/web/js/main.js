@@ -6,6 +6,7 @@ import { Charts } from "./panel/charts.js";
 import { Commands } from "./net/commands.js";
 import { Controls } from "./ui/controls.js";
 import { find } from "./ui/dom.js";
+import { ForceLegend } from "./ui/force-legend.js";
 import { Renderer } from "./gl/renderer.js";
 import { Hud } from "./ui/hud.js";
 import { Input } from "./tools/input.js";
@@ -92,6 +93,7 @@ function start(renderer) {
   const panel = new Panel(find("parameters", HTMLFormElement), find("parameters-note", HTMLElement), app, banner);
   new Charts(find("plots", HTMLElement), find("figures", HTMLElement), simulation);
   new Hint(app, input);
+  const forceLegend = new ForceLegend(app);
   const hud = new Hud(find("hud", HTMLOutputElement), simulation, renderer);
 
   listenToSimulation(input);
@@ -105,6 +107,7 @@ function start(renderer) {
     input.tick(nowMs);
     panel.tick();
     hud.tick(nowMs);
+    forceLegend.tick();
     renderer.resize();
     const between = performance.now();
     if (renderer.isDirty) renderer.draw();

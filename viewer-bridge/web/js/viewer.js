@@ -31,6 +31,9 @@ export function createViewer({ app, connector, banner, input, faults, scriptMs }
     get grabbed() { return input.tool !== null && "particle" in input.tool ? input.tool.particle : null; },
     get pointerMode() { return input.mode; },
     get toggles() { return { ...renderer.toggles }; },
+    /** The drawn force arrows, in N, and their length per newton. */
+    get arrows() { return renderer.arrowsDrawn.map(({ from, force, ...which }) => ({ ...which, from: [...from], force: [...force] })); },
+    get unitsPerNewton() { return renderer.unitsPerNewton(); },
     get heatMax() { return renderer.heatMax; },
     get renderer() { return renderer.rendererName; },
     get banner() { return banner.text; },

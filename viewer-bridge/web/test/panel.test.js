@@ -4,7 +4,8 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { ROWS, SLIDER_STEPS, editable, positionOf, rangeOf, restoring, rowsOf, typedValue, valueAt, valueOf } from "../js/panel/parameters.js";
 import { Series } from "../js/panel/series.js";
-import { niceCeiling, readable } from "../js/ui/format.js";
+import { niceCeiling } from "../js/geometry/round.js";
+import { readable } from "../js/ui/format.js";
 
 test("a series keeps the newest samples, and a column has their minimum and maximum", () => {
   const series = new Series(4);

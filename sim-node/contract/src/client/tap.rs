@@ -185,6 +185,11 @@ impl Tap {
         Ok(())
     }
 
+    /// Ends the reading of the forces. Without another reader, the owner stops computing them.
+    pub fn end_forces(&mut self) {
+        self.forces = None;
+    }
+
     /// Returns the oldest unread state with everything that belongs to it; `None` if all were read. A
     /// reader more than [`crate::SNAPSHOTS_BUFFERED`] states behind misses some.
     ///

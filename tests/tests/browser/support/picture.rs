@@ -108,6 +108,11 @@ pub(crate) fn is_grab_mark([red, green, blue]: Color) -> bool {
     red > 200 && (90..190).contains(&green) && blue < 100
 }
 
+/// The arrow of a force: green.
+pub(crate) fn is_force([red, green, blue]: Color) -> bool {
+    red < 60 && green > 120 && (100..170).contains(&blue)
+}
+
 /// The mark of a pinned particle: blue.
 pub(crate) fn is_pin([red, green, blue]: Color) -> bool {
     blue > 170 && red < 120 && green < 160

@@ -16,7 +16,7 @@ use super::node_text::node_text;
 use super::statistics::statistics;
 use super::updates::Updates;
 use crate::limits::{FRAMES_PER_SECOND_MAX, RELEASE_TIMEOUT};
-use crate::message::{Node, ParametersText};
+use crate::message::{Level, Node, ParametersText};
 use crate::request::{Request, RequestKind, Requests};
 use crate::scene::catalog::Catalog;
 use crate::sink::{Demand, Sinks, State, Update};
@@ -64,6 +64,8 @@ pub(super) struct Link {
     newest: NewestState,
     status: Option<NodeStatus>,
     parameters: Option<ParameterValues>,
+    /// A client wants the forces, so that the tap reads them.
+    reads_forces: bool,
     /// The parameters that were published last.
     published_parameters: Option<ParametersText>,
     pub(super) dispatch: Dispatch,
@@ -82,6 +84,7 @@ impl Link {
             newest: NewestState::default(),
             status: None,
             parameters: None,
+            reads_forces: false,
             published_parameters: None,
             dispatch: Dispatch::new(Arc::clone(catalog)),
             shown_id: None,
@@ -101,6 +104,7 @@ impl Link {
         self.handle_requests(shown, sinks, requests);
         // Commands that found the node's queue full are sent now, even without new requests.
         self.dispatch.flush(&mut self.client, sinks);
+        self.follow_forces(sinks);
         let is_due = sinks.has_demand(Demand::State) && monotonic_ns() >= self.next_frame_ns;
         if is_due && self.is_fast() {
             // A fast node always has a state that was not shown. The first wait clears the wake-ups
@@ -124,6 +128,21 @@ impl Link {
             return Err(LinkEnd::ShuttingDown);
         }
         self.check_owner(now_ns)
+    }
+
+    /// Reads the forces while a client wants them: a reader costs the node time.
+    pub(super) fn follow_forces(&mut self, sinks: &Sinks) {
+        let is_wanted = sinks.has_demand(Demand::Forces);
+        if is_wanted == self.reads_forces {
+            return;
+        }
+        self.reads_forces = is_wanted;
+        if !is_wanted {
+            self.tap.end_forces();
+        } else if let Err(error) = self.tap.read_forces() {
+            let text = format!("the forces cannot be read: {error}");
+            sinks.publish(&Update::Notice { level: Level::Warning, text: &text });
+        }
     }
 
     /// Returns whether the node makes a state within [`FRESH_STATE_WAIT`].
@@ -222,7 +241,9 @@ impl Link {
 
     /// Shows the newest state, if a frame is due and the state is new.
     pub(super) fn show(&mut self, shown: &ShownState, sinks: &Sinks) {
-        let Some(LoadedState { load, header, particles }) = self.newest.get() else { return };
+        let Some(LoadedState { load, header, particles, forces }) = self.newest.get() else {
+            return;
+        };
         let now_ns = monotonic_ns();
         let id = ShownId { epoch: shown.epoch(), step: header.step };
         let is_due = now_ns >= self.next_frame_ns && self.shown_id != Some(id);
@@ -238,6 +259,7 @@ impl Link {
                 | flag(SnapshotFlags::REPLAY, frame_flag::REPLAY),
             publish_monotonic_ns: header.publish_monotonic_ns,
             particles,
+            forces,
         };
         shown.show(sinks, state);
         self.shown_id = Some(id);

@@ -1,6 +1,8 @@
 //! The newest state of a node, and the load to which it belongs.
 
-use sim_contract::{LoadHeader, LoadedScene, ParticleState, SnapshotHeader, State as NodeState};
+use sim_contract::{
+    Change, Forces, LoadHeader, LoadedScene, ParticleState, SnapshotHeader, State as NodeState,
+};
 
 use crate::scene::load::{Load, LoadError};
 use crate::scene::summary::SceneSummary;
@@ -17,6 +19,8 @@ pub(super) struct NewestState {
     load_header: Option<LoadHeader>,
     header: SnapshotHeader,
     particles: Vec<ParticleState>,
+    /// The forces of the step, if they were read.
+    forces: Option<Forces>,
 }
 
 /// A state with its load.
@@ -25,6 +29,7 @@ pub(super) struct LoadedState<'a> {
     pub(super) load: &'a Load,
     pub(super) header: &'a SnapshotHeader,
     pub(super) particles: &'a [ParticleState],
+    pub(super) forces: Option<&'a Forces>,
 }
 
 impl NewestState {
@@ -41,6 +46,7 @@ impl NewestState {
         self.header = *state.header;
         self.particles.clear();
         self.particles.extend_from_slice(state.particles);
+        self.forces = forces_of(state);
         let Some(load) = &self.load else { return };
         let (step, constraint_count) = (state.header.step, load.constraints.len());
         shown.set_pins(sinks, step, state.particles);
@@ -67,8 +73,18 @@ impl NewestState {
     /// The state, once there is one.
     pub(super) fn get(&self) -> Option<LoadedState<'_>> {
         let load = self.load.as_ref()?;
-        Some(LoadedState { load, header: &self.header, particles: &self.particles })
+        let (header, particles, forces) = (&self.header, &self.particles, self.forces.as_ref());
+        Some(LoadedState { load, header, particles, forces })
     }
+}
+
+/// Returns the forces of the step of a state.
+fn forces_of(state: &NodeState<'_>) -> Option<Forces> {
+    let own = state.changes.iter().rev().find_map(|change| match change {
+        Change::Forces(header, rows) if header.step == state.header.step => Some((header, rows)),
+        _ => None,
+    });
+    own.map(|(header, rows)| Forces { header: *header, rows: rows.clone() })
 }
 
 fn read_load(loaded: &LoadedScene) -> Result<Load, LoadError> {

@@ -15,7 +15,7 @@ pub(super) fn statistics(
     shown: &ShownState,
     gravity: [f32; 3],
 ) -> Statistics {
-    let LoadedState { load, header, particles } = state;
+    let LoadedState { load, header, particles, .. } = state;
     let is_torn = torn_flags(load.constraints.len(), shown.torn());
     let measures = measure(particles, &load.constraints, &is_torn, gravity);
     let percentiles = |p50, p99| Percentiles { p50: microseconds(p50), p99: microseconds(p99) };

@@ -8,13 +8,13 @@ use serde_json::{Value, json};
 use sim_contract::testing::TestDomain;
 use sim_contract::{
     Action, COMMANDS_BUFFERED, ColliderState, CollidersHeader, Command as Sent, ConstraintState,
-    Load as OwnerLoad, LoadHeader, NodeStatus, Outcome, Owner, ParameterValues, ParticleState,
-    SnapshotHeader, TearsHeader, TornConstraint,
+    ForceRow, ForcesHeader, Load as OwnerLoad, LoadHeader, NodeStatus, Outcome, Owner,
+    ParameterValues, ParticleState, SnapshotHeader, TearsHeader, TornConstraint,
 };
 
 use super::link::{Link, LinkEnd};
 use crate::message::{Choice, Command, Mode};
-use crate::pages::connection::Connection;
+use crate::pages::connection::{Connection, NextFrame};
 use crate::pages::hub::Hub;
 use crate::request::{ClientId, Request, RequestKind, Requests, requests};
 use crate::sink::{Demand, Sink, Sinks, Update};
@@ -110,6 +110,26 @@ impl Fixture {
         let Some(set) = &frame.colliders else { return Vec::new() };
         let Ok(Wire::Colliders(all)) = decode(&set.bytes) else { panic!("not COLLIDERS") };
         all.colliders.iter().map(|collider| collider.radius).collect()
+    }
+
+    /// Publishes the forces of a step, and then its state.
+    fn publish_forces(&self, step: u64, rows: &[ForceRow]) {
+        let header = ForcesHeader { run_id: RUN_ID, step, rate_hz: 60, count: 0 };
+        self.owner.publish_forces(header, rows).unwrap();
+        self.publish(step, 0, 2);
+    }
+
+    /// Follows the wishes of the pages.
+    fn exchange(&mut self) {
+        self.link.exchange(&mut self.shown, &self.sinks, &self.requests).unwrap();
+        self.owner.refresh();
+    }
+
+    /// Messages that a page receives with the newest frame.
+    fn received(page: &mut Connection) -> Vec<Wire> {
+        let NextFrame::Frame(messages) = page.next_frame() else { panic!("no frame") };
+        page.acknowledge(u32::MAX);
+        messages.iter().map(|bytes| decode(bytes).unwrap()).collect()
     }
 
     fn command(&mut self, command: Command) {
@@ -361,4 +381,40 @@ fn a_page_that_joins_later_reads_why_the_newest_load_is_not_shown() {
     fixture.read();
     let mut latest = fixture.hub.join(Choice::F32);
     assert_eq!(newest_text(&mut latest, "notice"), None);
+}
+
+#[test]
+fn forces_are_read_while_a_page_wants_them_and_sent_to_that_page_with_their_frame() {
+    let mut fixture = Fixture::start();
+    let mut other = fixture.hub.join(Choice::F32);
+    fixture.exchange();
+    assert_eq!(fixture.owner.forces_reader_count(), 0);
+    fixture.page.set_wants_forces(true);
+    fixture.exchange();
+    assert_eq!(fixture.owner.forces_reader_count(), 1);
+    let row = |step: f32| ForceRow { kind: 2, impulse: [0.0, step, 0.0], ..ForceRow::default() };
+    // The forces of a later step have arrived as well, but not its state.
+    fixture.publish_forces(1, &[row(1.0)]);
+    let header = ForcesHeader { run_id: RUN_ID, step: 2, rate_hz: 60, count: 0 };
+    fixture.owner.publish_forces(header, &[row(2.0)]).unwrap();
+    fixture.read();
+    let [Wire::Forces(forces), Wire::Frame(frame)] = &Fixture::received(&mut fixture.page)[..]
+    else {
+        panic!("not FORCES and FRAME")
+    };
+    assert_eq!((forces.stamp, forces.rate_hz), (frame.head.stamp, 60));
+    assert_eq!((forces.stamp.step, &forces.rows), (1, &vec![row(1.0)]));
+    assert!(matches!(Fixture::received(&mut other)[..], [Wire::Frame(_)]), "it asked for none");
+
+    // A step without forces.
+    fixture.publish(3, 0, 2);
+    fixture.read();
+    assert!(matches!(Fixture::received(&mut fixture.page)[..], [Wire::Frame(_)]));
+    other.set_wants_forces(true);
+    fixture.page.set_wants_forces(false);
+    fixture.exchange();
+    assert_eq!(fixture.owner.forces_reader_count(), 1, "another page wants them");
+    fixture.hub.leave(other.client);
+    fixture.exchange();
+    assert_eq!(fixture.owner.forces_reader_count(), 0);
 }

@@ -279,6 +279,7 @@ impl<'a> Player<'a> {
             flags: frame_flag::REPLAY,
             publish_monotonic_ns: now_ns,
             particles: &self.state.particles,
+            forces: None,
         };
         self.shown.show(self.sinks, state);
     }

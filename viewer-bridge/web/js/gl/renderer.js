@@ -4,15 +4,17 @@
 import { add, addScaled, dot, multiply, normalize, scale, shadowOnto, tangents } from "../geometry/math.js";
 import { HEAT_STOPS, linear, paletteOf } from "./theme.js";
 import { openContext, rendererName } from "./context.js";
+import { Arrows } from "./arrows.js";
 import { Drawables, SceneBuffers } from "./buffers.js";
 import { Colliders, placeCollider } from "./colliders.js";
 import { Ground } from "./ground.js";
+import { ForceScale, arrowsOf } from "../state/forces.js";
 
 /** @typedef {import("../geometry/math.js").Vec3} Vec3 */
 /** @typedef {import("../state/simulation.js").Simulation} Simulation */
 /** @typedef {import("../geometry/camera.js").Camera} Camera */
 /** @typedef {Record<string, number | number[]>} Uniforms */
-/** @typedef {{ surface: boolean, sticks: boolean, particles: boolean, pins: boolean, heat: boolean, shadow: boolean }} Toggles */
+/** @typedef {{ surface: boolean, sticks: boolean, particles: boolean, pins: boolean, heat: boolean, shadow: boolean, forces: boolean }} Toggles */
 
 /** Limit on device pixels per CSS pixel: the cost grows with the square, and a finer picture looks the same. */
 const PIXEL_RATIO_MAX = 2;
@@ -21,6 +23,8 @@ const HEAT_COLORS = HEAT_STOPS.flatMap((hex) => linear(hex));
 const LAMP_RADII = 2.6;
 /** Size of the ground, in radii of the scene; it fades out towards its edge. */
 const GROUND_RADII = 6;
+/** Width of the shaft of a force arrow, in CSS pixels. */
+const ARROW_WIDTH = 3;
 /** Scenes with more particles than a ragdoll are drawn with thinner sticks. */
 const FEW_PARTICLES = 60;
 
@@ -38,7 +42,10 @@ export class Renderer {
     this.viewport = { width: 1, height: 1 };
     this.heatMax = 0.05;
     /** @type {Toggles} */
-    this.toggles = { surface: true, sticks: false, particles: false, pins: true, heat: false, shadow: true };
+    this.toggles = { surface: true, sticks: false, particles: false, pins: true, heat: false, shadow: true, forces: false };
+    this.forceScale = new ForceScale();
+    /** The drawn forces. @type {import("../state/forces.js").Arrow[]} */
+    this.arrowsDrawn = [];
     this.framesDrawn = 0;
     this.stepDrawn = -1;
     /** @type {import("../net/wire.js").Frame | null} */
@@ -59,6 +66,7 @@ export class Renderer {
   create() {
     this.ground = new Ground(this.gl);
     this.colliders = new Colliders(this.gl);
+    this.arrows = new Arrows(this.gl);
     /** By whether they read quantised positions. Kept for both formats, because compiling is slow. @type {Map<boolean, Drawables>} */
     this.drawablesByFormat = new Map();
     /** Those for the format of the frame. @type {Drawables | null} */
@@ -72,7 +80,10 @@ export class Renderer {
 
   listen() {
     const { simulation } = this;
-    simulation.on("scene", () => this.invalidate({}));
+    simulation.on("scene", () => {
+      this.forceScale = new ForceScale();
+      this.invalidate({});
+    });
     simulation.on("frame", () => this.invalidate({}));
     simulation.on("tear", () => this.invalidate({ topology: true, particles: true }));
     simulation.on("pins", () => this.invalidate({ marks: true }));
@@ -118,6 +129,7 @@ export class Renderer {
     this.drawSurroundings(uniforms);
     if (this.simulation.scene?.isPlanar) this.drawFlat(uniforms);
     else this.drawSolid(uniforms);
+    this.drawForces(uniforms);
     this.framesDrawn++;
     this.isDirty = false;
   }
@@ -312,6 +324,21 @@ export class Renderer {
     // A grabbed particle stays visible behind a fold.
     this.gl.disable(this.gl.DEPTH_TEST);
     drawables.points.draw(drawables.points.grabbed, marks);
+  }
+
+  /** @param {Uniforms} uniforms */
+  drawForces(uniforms) {
+    this.arrowsDrawn = this.toggles.forces && this.buffers !== null ? arrowsOf(this.simulation) : [];
+    this.forceScale.follow(this.arrowsDrawn);
+    const palette = paletteOf(this.isDark);
+    const ratio = this.canvas.height / this.viewport.height;
+    this.arrows?.set(this.arrowsDrawn, this.unitsPerNewton());
+    this.arrows?.draw(uniforms, { width: ARROW_WIDTH * ratio, rim: ratio, color: palette.force, rimColor: palette.ring });
+  }
+
+  /** Length of a force arrow per newton. */
+  unitsPerNewton() {
+    return this.forceScale.unitsPerNewton(this.simulation.radius());
   }
 
   hasSurface() {

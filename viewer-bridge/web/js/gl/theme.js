@@ -15,18 +15,22 @@ export function linear(hex) {
  */
 export const HEAT_STOPS = ["#0b2f6b", "#41527a", "#7b7b7b", "#b9a85a", "#fde737"];
 
+/** The colour of force arrows, also in their legend. */
+export const FORCE_COLOR = "#009c8c";
+
 /**
  * @typedef {{
  *   backdropTop: Color, backdropBottom: Color, ground: Color, gridLine: Color, gridContrast: number, shadow: number,
  *   sky: Color, bounce: Color, key: number,
  *   front: Color, back: Color, stick: Color, stickFaint: Color, particle: Color, collider: Color,
  *   flatSurface: Color, flatStick: Color,
- *   pin: Color, anchor: Color, grabbed: Color, frozen: Color, ring: Color,
+ *   pin: Color, anchor: Color, grabbed: Color, frozen: Color, ring: Color, force: Color,
  * }} Palette
  */
 
 const MARKS = {
   pin: linear("#2f6fde"), anchor: linear("#7a4fd0"), grabbed: linear("#ff8a1f"), frozen: linear("#e0218a"), ring: linear("#ffffff"),
+  force: linear(FORCE_COLOR),
 };
 
 /** @type {Palette} */

@@ -44,7 +44,10 @@
  *   a: Vec3, b: Vec3, velocity: Vec3, angularVelocity: Vec3,
  * }} Collider
  * @typedef {Header & { kind: "colliders", colliders: Collider[] }} Colliders
- * @typedef {Scene | Frame | Tear | Pins | Stats | Colliders} Message
+ *
+ * @typedef {{ kind: "collider" | "anchor" | "particle", index: number, impulse: Vec3, angularImpulse: Vec3, contacts: number }} ForceRow  in N s and N m s
+ * @typedef {Header & { kind: "forces", rateHz: number, rows: ForceRow[] }} Forces
+ * @typedef {Scene | Frame | Tear | Pins | Stats | Colliders | Forces} Message
  */
 
 /** Flags of a particle in PINS. */
@@ -55,6 +58,8 @@ export const CONSTRAINT = Object.freeze({ structural: 0, shear: 1, bend: 2, teth
 const VERSION = 1;
 const SHAPES = /** @type {const} */ (["plane", "box", "sphere", "capsule", "bounds", "mesh"]);
 const COLLIDER_BYTES = 120;
+const RECIPIENTS = /** @type {const} */ (["collider", "anchor", "particle"]);
+const FORCE_BYTES = 40;
 
 /** Reads consecutive fields of a message. Throws a RangeError beyond its end. */
 class Reader {
@@ -113,6 +118,7 @@ const DECODERS = /** @type {Record<number, (reader: Reader, header: Header) => M
   5: decodePins,
   6: decodeStats,
   7: decodeColliders,
+  8: decodeForces,
 });
 
 /**
@@ -261,4 +267,21 @@ function decodeCollider(reader, index) {
   const angularVelocity = reader.f32x3();
   if (shape === undefined) return null;
   return { index, shape, restitution, friction, radius, offset, normal, center, halfExtents, rotation, a, b, velocity, angularVelocity };
+}
+
+/** @param {Reader} reader @param {Header} header @returns {Forces} */
+function decodeForces(reader, header) {
+  const count = reader.u32();
+  const rateHz = reader.u32();
+  if (reader.at + count * FORCE_BYTES > reader.view.byteLength) throw new RangeError("the message ends within its forces");
+  /** @type {ForceRow[]} */
+  const rows = [];
+  for (let row = 0; row < count; row++) {
+    const kind = RECIPIENTS[reader.u32()];
+    const [index, impulse, angularImpulse, contacts] = [reader.u32(), reader.f32x3(), reader.f32x3(), reader.u32()];
+    reader.u32();
+    // A kind of a later version is skipped.
+    if (kind !== undefined) rows.push({ kind, index, impulse, angularImpulse, contacts });
+  }
+  return { kind: "forces", ...header, rateHz, rows };
 }

@@ -1,7 +1,8 @@
 // The measurements: four small plots, redrawn with each STATS message, and figures below them.
 
 import { cssColor, make, sharpContext } from "../ui/dom.js";
-import { niceCeiling, readable } from "../ui/format.js";
+import { niceCeiling } from "../geometry/round.js";
+import { readable } from "../ui/format.js";
 import { Series } from "./series.js";
 
 /** Capacity of the series: 20 s of frames, and 20 s of STATS messages (four per second). */

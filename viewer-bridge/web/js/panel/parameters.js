@@ -1,7 +1,7 @@
 // The logic of the parameter panel: rows, ranges, and the mapping between slider positions and values.
 // No DOM here.
 
-import { niceCeiling } from "../ui/format.js";
+import { niceCeiling } from "../geometry/round.js";
 import { toNumber } from "../net/messages.js";
 
 /** @typedef {import("../net/messages.js").Values} Values */

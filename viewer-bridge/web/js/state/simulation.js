@@ -15,6 +15,7 @@ import { add, boxOf, dot, length, scale, subtract } from "../geometry/math.js";
 /** @typedef {import("../net/wire.js").Frame} Frame */
 /** @typedef {import("../net/wire.js").Stats} Stats */
 /** @typedef {import("../net/wire.js").Collider} Collider */
+/** @typedef {import("../net/wire.js").Forces} Forces */
 /** @typedef {import("../net/messages.js").Hello} Hello */
 /** @typedef {import("../net/messages.js").NodeState} NodeState */
 /** @typedef {import("../net/messages.js").Parameters} Parameters */
@@ -56,6 +57,10 @@ export class Simulation extends Emitter {
     this.pins = new Map();
     /** @type {Collider[]} */
     this.colliders = [];
+    /** The forces of the frame, if the page has asked for them. @type {Forces | null} */
+    this.forces = null;
+    /** The newest forces received: their frame follows. @type {Forces | null} */
+    this.forcesReceived = null;
     /** @type {ArrayLike<number>} */
     this.nonFinite = [];
     /** @type {Stats | null} */
@@ -117,6 +122,7 @@ export class Simulation extends Emitter {
     if (message.kind === "frame") this.receiveFrame(message);
     else if (message.kind === "tear") this.receiveTear(message);
     else if (message.kind === "pins") this.receivePins(message);
+    else if (message.kind === "forces") this.forcesReceived = message;
     else this.receiveColliders(message.colliders);
   }
 
@@ -129,6 +135,8 @@ export class Simulation extends Emitter {
     this.pinsReceived = new Map();
     this.pins = new Map();
     this.colliders = [];
+    this.forces = null;
+    this.forcesReceived = null;
     this.nonFinite = [];
     this.ground = null;
     this.lowest = null;
@@ -142,6 +150,7 @@ export class Simulation extends Emitter {
   receiveFrame(frame) {
     if (frame.particleCount !== this.scene?.particleCount) return;
     this.frame = frame;
+    this.forces = this.forcesReceived?.step === frame.step ? this.forcesReceived : null;
     if (!sameNumbers(frame.nonFinite, this.nonFinite)) {
       this.nonFinite = frame.nonFinite.slice();
       this.rebuild();

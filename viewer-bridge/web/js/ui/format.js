@@ -1,12 +1,4 @@
-// Numbers as text, and round numbers for the ends of scales.
-
-/** The smallest 1, 2 or 5 times a power of ten that is at least `value`. @param {number} value */
-export function niceCeiling(value) {
-  if (!(value > 0) || !Number.isFinite(value)) return 1;
-  const power = 10 ** Math.floor(Math.log10(value));
-  const step = [1, 2, 5, 10].find((factor) => factor * power >= value * (1 - 1e-12)) ?? 10;
-  return step * power;
-}
+// Numbers as text.
 
 /** Values below these are noise and shown as 0: a thousandth of a percent, a nanojoule. */
 const NOISE = /** @type {Record<string, number>} */ ({ "%": 1e-5, J: 1e-9 });

@@ -3,7 +3,8 @@
 import { find, sharpContext } from "./dom.js";
 import { firstViewBox } from "../state/framing.js";
 import { formatLink } from "./link.js";
-import { niceCeiling, readable } from "./format.js";
+import { readable } from "./format.js";
+import { niceCeiling } from "../geometry/round.js";
 import { HEAT_STOPS } from "../gl/theme.js";
 
 /** @typedef {import("./link.js").CameraPose} CameraPose */

@@ -2,8 +2,8 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { FAN_WORDS, STICK, Topology, drawnSticks } from "../js/state/topology.js";
-import { lowestReach, lowestWithin } from "../js/state/hanging.js";
+import { FAN_WORDS, STICK, Topology, drawnSticks } from "../../js/state/topology.js";
+import { lowestReach, lowestWithin } from "../../js/state/hanging.js";
 
 /** A sheet of columns x rows, one unit apart, hanging along -y. Constraints run right, down, and diagonally down-right. */
 function sheet(columns, rows) {

@@ -2,8 +2,8 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { firstViewBox, heldBox } from "../js/state/framing.js";
-import { Simulation } from "../js/state/simulation.js";
+import { firstViewBox, heldBox } from "../../js/state/framing.js";
+import { Simulation } from "../../js/state/simulation.js";
 
 const scene = (epoch, rest = {}) => ({
   kind: "scene", epoch, step: 0, particleCount: 2, constraintCount: 1, triangleCount: 0, isPlanar: false, up: "y",

@@ -1,0 +1,47 @@
+// The scale of the force arrows, and the request for forces: a node computes them only while somebody reads them.
+
+import { find } from "./dom.js";
+import { readable } from "./format.js";
+import { niceFloor } from "../geometry/round.js";
+
+/** Longest arrow of the legend, in CSS pixels. */
+const LENGTH_MAX = 120;
+
+export class ForceLegend {
+  /** @param {import("../tools/tool.js").App} app */
+  constructor(app) {
+    this.app = app;
+    this.legend = find("force-legend", HTMLElement);
+    this.arrow = find("force-arrow", HTMLElement);
+    this.scale = find("force-scale", HTMLOutputElement);
+    /** The bridge sends forces on this connection. */
+    this.isAsked = false;
+    app.simulation.on("connection", () => { this.isAsked = false; });
+  }
+
+  /** Asks for forces or ends the request, and shows the scale at the middle of the view. */
+  tick() {
+    const { simulation, renderer, commands } = this.app;
+    const isWanted = renderer.toggles.forces && simulation.isConnected && !simulation.isReplay;
+    if (isWanted !== this.isAsked && commands.stream("forces", { is_on: isWanted })) this.isAsked = isWanted;
+    if (this.legend.hidden === isWanted) this.legend.hidden = !isWanted;
+    if (isWanted) this.show();
+  }
+
+  show() {
+    const { camera, renderer, simulation } = this.app;
+    const unitsPerNewton = renderer.unitsPerNewton();
+    const newtonsPerPixel = camera.unitsPerPixel(camera.target, renderer.viewport) / unitsPerNewton;
+    const newtons = niceFloor(LENGTH_MAX * newtonsPerPixel);
+    const width = simulation.forces === null || unitsPerNewton === 0 ? 0 : newtons / newtonsPerPixel;
+    const waiting = simulation.isPaused ? "after the next step" : "waiting";
+    setText(this.scale, width === 0 ? waiting : readable(newtons, "N"));
+    const pixels = `${width.toFixed(1)}px`;
+    if (this.arrow.style.width !== pixels) this.arrow.style.width = pixels;
+  }
+}
+
+/** @param {HTMLElement} element @param {string} text */
+function setText(element, text) {
+  if (element.textContent !== text) element.textContent = text;
+}
