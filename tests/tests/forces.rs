@@ -191,3 +191,39 @@ fn a_node_computes_no_forces_for_a_killed_reader() {
         while client.forces(DEADLINE).unwrap().unwrap().header.step <= step {}
     }
 }
+
+#[test]
+fn a_live_body_stands_without_a_command_and_the_status_counts_it() {
+    let sandbox = Sandbox::new();
+    let scene = "version = 1\n[[collider]]\nshape = \"sphere\"\ncenter = [0, 0, 0]\nradius = 0.1\n\
+                 body = { mass = 1, inertia = [0.004, 0.004, 0.004] }\n\
+                 [[collider]]\nshape = \"sphere\"\ncenter = [1, 0, 0]\nradius = 0.1\n";
+    let scene = sandbox.write("ball.toml", scene);
+    let _node = Process::start_ready(Program::SimNode, &sandbox, &["run", &scene]);
+    assert_eq!(ctl(&sandbox, &["status"])["standing_body_steps"], 0);
+    let drive = ["drive-body", "0", "0", "2", "0", "--velocity", "2.4", "0", "0"];
+    assert_eq!(ctl(&sandbox, &drive)["status"], "applied");
+    let counted = wait_for("steps in which it stands", || {
+        let counted = ctl(&sandbox, &["status"])["standing_body_steps"].as_u64().unwrap();
+        (counted > 20).then_some(counted)
+    });
+    let step = ctl(&sandbox, &["hash"])["step"].as_u64().unwrap();
+    assert!(counted < step, "{counted} of {step} steps");
+    // It fell and moved for one step of 1/240 s, and has stood there since.
+    let mut client = Client::attach(&sandbox.endpoint()).unwrap();
+    let ball = client.colliders(DEADLINE).unwrap().colliders[0];
+    assert!((ball.center[0] - 0.01).abs() < 1e-6, "{:?}", ball.center);
+    assert!((ball.center[1] - 2.0).abs() < 2e-4, "{:?}", ball.center);
+    assert_eq!(ball.velocity, [0.0; 3]);
+    let status = Process::run(Program::SimNode, &sandbox, &["ctl", "status"]).stdout;
+    assert!(status.contains("bodies         stood in "), "{status}");
+    for (collider, problem) in [
+        ("1", "the collider is no body; the scene makes it one with body = { mass, inertia }"),
+        ("2", "allowed: 0 to 1"),
+    ] {
+        let line = ["ctl", "drive-body", collider, "0", "0", "0"];
+        let done = Process::run(Program::SimNode, &sandbox, &line);
+        assert_eq!(done.code, Some(4), "{}", done.stderr);
+        assert!(done.stdout.contains(problem), "{}", done.stdout);
+    }
+}

@@ -27,6 +27,7 @@ use crate::store::{Location, ParticleStore};
 /// Finds and resolves the contacts of particles with driven bodies. Empty in scenes without bodies.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct BodyContacts {
+    are_on: bool,
     /// By particle: where it is in the store.
     locations: Vec<Location>,
     /// The particles near a body in the running substep.
@@ -37,9 +38,10 @@ pub(crate) struct BodyContacts {
 }
 
 impl BodyContacts {
-    /// Makes room for this number of particles.
+    /// Those of a scene with bodies and this number of particles.
     pub(crate) fn new(particle_count: usize) -> Self {
         Self {
+            are_on: true,
             locations: vec![Location::default(); particle_count],
             candidates: Vec::with_capacity(particle_count),
             ordered: Vec::with_capacity(particle_count),
@@ -49,7 +51,7 @@ impl BodyContacts {
 
     /// True in a scene with bodies.
     pub(crate) fn are_on(&self) -> bool {
-        !self.locations.is_empty()
+        self.are_on
     }
 
     /// Updates the locations of the particles.
