@@ -70,6 +70,8 @@ def test_a_node_drives_a_body_in_lockstep(start_node: StartNode, tmp_path: Path)
         node.resume()
         for snapshot in turns:
             if snapshot.step == 1:
-                require_hit(node.forces_of(snapshot))
+                forces = node.forces_of(snapshot)
+                assert forces is not None
+                require_hit(forces)
                 break
             turns.drive_body(0, (0, 0, 0))
