@@ -6,7 +6,7 @@ use std::time::Duration;
 use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
-use recorder::{CollidersRow, ForcesRow, StatusRow};
+use recorder::{CollidersRow, StatusRow};
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{
     Client, Endpoint, GivenState, OwnerState, ParticleState, ReadError, Reason, RequestError,
@@ -17,14 +17,13 @@ use crate::arguments;
 use crate::attach::attach;
 use crate::convert::{from_json, motion};
 use crate::data::action::Action;
-use crate::data::forces::Forces;
+use crate::data::forces::{Forces, forces_row};
 use crate::data::outcome::{Outcome, indices};
 use crate::data::scene::{Topology, corners};
-use crate::data::snapshot::Snapshot;
+use crate::data::snapshot::{ForcesSource, Snapshot};
 use crate::data::state::{State, current_state};
 use crate::error::{
-    Error, NotRunning, Timeout, TooManySnapshots, endpoint_error, read_error, request_error,
-    with_timeout,
+    NotRunning, Timeout, TooManySnapshots, endpoint_error, read_error, request_error, with_timeout,
 };
 use crate::patience::{Patience, wait};
 use crate::process::OfProcess;
@@ -37,6 +36,8 @@ const LATCHED_TIMEOUT_S: f64 = 5.0;
 pub(crate) struct Node {
     pub(crate) endpoint: Endpoint,
     client: OfProcess<Client>,
+    /// Each snapshot comes with its forces.
+    reads_forces: bool,
     /// The newest snapshot that was read, which `latest` returns again until there is a newer one.
     newest: Mutex<Option<Py<Snapshot>>>,
 }
@@ -164,37 +165,64 @@ impl Node {
         py: Python<'_>,
         snapshot: sim_contract::Snapshot,
     ) -> PyResult<Py<Snapshot>> {
-        let snapshot = Py::new(py, Snapshot::shared(snapshot))?;
+        let forces = self.forces_of(py, snapshot.header())?;
+        let snapshot = Py::new(py, Snapshot::shared(snapshot, forces))?;
         let replaced = self.newest().replace(snapshot.clone_ref(py));
         // Outside of the lock, because it may run code of Python.
         drop(replaced);
         Ok(snapshot)
+    }
+
+    /// Returns the forces of the step of a snapshot, which the node has published before it.
+    fn forces_of(&self, py: Python<'_>, header: &SnapshotHeader) -> PyResult<ForcesSource> {
+        if !self.reads_forces {
+            return Ok(ForcesSource::Unread("attach with `catenary.attach(..., forces=True)`"));
+        }
+        let read = |client: &mut Client| client.forces_of(header, Duration::ZERO);
+        let forces = self.call(py, |client| read(client).map_err(|e| read_error(&e)))?;
+        let row = |forces| Ok::<_, PyErr>((forces_row(&forces)?, forces.header.rate_hz));
+        Ok(ForcesSource::Read(forces.map(row).transpose()?))
+    }
+
+    /// Attaches with an id, or with a random one. With `reads_forces`, the node computes forces from its next step on.
+    fn connect(
+        py: Python<'_>,
+        endpoint: Endpoint,
+        client_id: Option<u64>,
+        timeout: f64,
+        reads_forces: bool,
+    ) -> PyResult<Self> {
+        let client = attach(py, &endpoint, client_id, timeout)?;
+        let client = OfProcess::new("node", client);
+        let node = Self { endpoint, client, reads_forces, newest: Mutex::default() };
+        if reads_forces {
+            node.call(py, |client| client.forces(Duration::ZERO).map_err(|e| read_error(&e)))?;
+        }
+        Ok(node)
     }
 }
 
 #[pymethods]
 impl Node {
     #[new]
-    #[pyo3(signature = (name="sim", *, domain=None, timeout=0.0, client_id=None))]
+    #[pyo3(signature = (name="sim", *, domain=None, timeout=0.0, client_id=None, forces=false))]
+    #[allow(clippy::too_many_arguments, reason = "these are the keywords of Python")]
     fn new(
         py: Python<'_>,
         name: &str,
         domain: Option<&str>,
         timeout: f64,
         #[pyo3(from_py_with = arguments::client_id)] client_id: Option<u64>,
+        forces: bool,
     ) -> PyResult<Self> {
         let endpoint = Endpoint::from_options(domain, Some(name));
         let endpoint = endpoint.map_err(|error| endpoint_error(&error))?;
-        let client = attach(py, &endpoint, client_id, timeout)?;
-        let client = OfProcess::new("node", client);
-        Ok(Self { endpoint, client, newest: Mutex::default() })
+        Self::connect(py, endpoint, client_id, timeout, forces)
     }
 
     /// Returns another connection to the same node, with an id and a queue of snapshots of its own.
     fn another(&self, py: Python<'_>) -> PyResult<Self> {
-        let client = attach(py, &self.endpoint, None, 0.0)?;
-        let client = OfProcess::new("node", client);
-        Ok(Self { endpoint: self.endpoint.clone(), client, newest: Mutex::default() })
+        Self::connect(py, self.endpoint.clone(), None, 0.0, self.reads_forces)
     }
 
     /// Id of this client in outcomes and recordings.
@@ -319,14 +347,15 @@ impl Node {
     ///
     /// The node computes them only while a client reads them: the first call waits for the next step, and from then
     /// on each step costs the node a little more time, until `close`. A paused node has none until its next step, and
-    /// a replay only those of a recording that was made with `--forces`.
+    /// a replay only those of a recording that was made with `--forces`. `snapshot.forces` reads from the same queue:
+    /// a snapshot from before the forces that this returned has none then.
     ///
     /// Raises `Timeout` if there are none in time.
     #[pyo3(signature = (timeout=5.0))]
     fn forces(&self, py: Python<'_>, timeout: Option<f64>) -> PyResult<Forces> {
         let read = |client: &mut Client, part| client.forces(part).map_err(|e| read_error(&e));
         match self.read(py, Patience::new(timeout)?, read)? {
-            Some(forces) => show_forces(py, &forces),
+            Some(forces) => Forces::new(py, &forces_row(&forces)?, forces.header.rate_hz),
             None if self.is_running(py)? => Err(Timeout::new_err(format!(
                 "{} publishes no forces: is it paused (forces are those of a step), or a replay of a recording \
                  without them (`recorder record --forces`)?",
@@ -334,18 +363,6 @@ impl Node {
             ))),
             None => Err(self.silence(py)?),
         }
-    }
-
-    /// Returns the forces of the step of a snapshot, without waiting, or None if this connection has none.
-    ///
-    /// It has those since the first call of `forces` or `forces_of`, up to 64 steps back. Call it for snapshots in
-    /// their order: forces before the last read ones are gone.
-    fn forces_of(&self, py: Python<'_>, snapshot: &Snapshot) -> PyResult<Option<Forces>> {
-        let forces = self.call(py, |client| {
-            let forces = client.forces_of(snapshot.header(), Duration::ZERO);
-            forces.map_err(|error| read_error(&error))
-        })?;
-        forces.map(|forces| show_forces(py, &forces)).transpose()
     }
 
     /// Sends an action without waiting. Returns its sequence number, for `outcome`.
@@ -462,13 +479,6 @@ impl Node {
         let scene_hash = self.latched(py, Client::topology)?.header.scene_hash;
         self.give(py, &GivenState { scene_hash, particles, keyframe: None }, timeout)
     }
-}
-
-fn show_forces(py: Python<'_>, forces: &sim_contract::Forces) -> PyResult<Forces> {
-    let unknown =
-        || Error::new_err("the node publishes forces of another version: update it or this module");
-    let row = ForcesRow::new(forces.header.step, &forces.rows).ok_or_else(unknown)?;
-    Forces::new(py, &row, forces.header.rate_hz)
 }
 
 /// Returns `true` for a snapshot that its node has published just now. One from the future has the clock of

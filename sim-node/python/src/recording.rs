@@ -18,7 +18,7 @@ use crate::arguments;
 use crate::convert::from_json;
 use crate::data::forces::Forces;
 use crate::data::scene::{Topology, corners};
-use crate::data::snapshot::Snapshot;
+use crate::data::snapshot::{ForcesSource, Snapshot};
 use crate::data::state::State;
 use crate::error::{Error, RecordingError, recording_error};
 use crate::patience::run_until_signal;
@@ -211,15 +211,15 @@ impl Recording {
 
     /// Returns the snapshot of the last recorded step up to `step`, or else the first one.
     fn at_or_before(
-        &self,
+        this: &Bound<'_, Self>,
         py: Python<'_>,
         #[pyo3(from_py_with = arguments::step)] step: u64,
     ) -> PyResult<Snapshot> {
-        let (header, particles) = self.read(py, |tape| {
+        let (header, particles) = this.get().read(py, |tape| {
             let state = tape.state_at(step)?;
             Ok::<_, TapeError>((header(tape.run(), &state), state.particles.to_vec()))
         })?;
-        Ok(Snapshot::own(header, particles))
+        Ok(Snapshot::own(header, particles, ForcesSource::Recorded(this.clone().unbind())))
     }
 
     /// Returns the first recorded step after `step`.
@@ -255,7 +255,7 @@ impl Recording {
     ///
     /// Raises `KeyError` for a step before the first or after the last one, and `RecordingError` if the file has no
     /// forces of the step: it was made without `--forces`, or no step has led to its first state.
-    fn forces(
+    pub(crate) fn forces(
         &self,
         py: Python<'_>,
         #[pyo3(from_py_with = arguments::step)] step: u64,

@@ -18,7 +18,7 @@ use crate::data::action::Action;
 use crate::data::forces::Forces;
 use crate::data::outcome::{cause, indices, rejected};
 use crate::data::scene::{Topology, corners, load_scene, scene_error};
-use crate::data::snapshot::{POSITION, Snapshot, VELOCITY};
+use crate::data::snapshot::{ForcesSource, POSITION, Snapshot, VELOCITY};
 use crate::data::state::State;
 use crate::data::view;
 use crate::error::{Error, StateError};
@@ -27,6 +27,8 @@ use crate::process::OfProcess;
 
 /// The client id of every action.
 const CLIENT_ID: u64 = 1;
+
+const WITH_FORCES: &str = "make the simulation with `Simulation(..., forces=True)`";
 
 #[pyclass(frozen, subclass, module = "catenary")]
 #[derive(Debug)]
@@ -185,7 +187,11 @@ impl Simulation {
     fn snapshot(&self, py: Python<'_>) -> PyResult<Snapshot> {
         self.with(py, |running| {
             let particles = bytemuck::cast_slice(running.solver.particles()).to_vec();
-            Ok(Snapshot::own(self.header(running), particles))
+            let forces = match forces_row(&running.solver, running.step) {
+                Some(row) => ForcesSource::Read(Some((row, self.rate()))),
+                None => ForcesSource::Unread(WITH_FORCES),
+            };
+            Ok(Snapshot::own(self.header(running), particles, forces))
         })
     }
 
@@ -272,9 +278,7 @@ impl Simulation {
     fn forces(&self, py: Python<'_>) -> PyResult<Forces> {
         let row = self.with(py, |running| {
             forces_row(&running.solver, running.step).ok_or_else(|| {
-                Error::new_err(
-                    "this simulation computes no forces: make it with `Simulation(..., forces=True)`",
-                )
+                Error::new_err(format!("this simulation computes no forces: {WITH_FORCES}"))
             })
         })?;
         Forces::new(py, &row, self.rate())

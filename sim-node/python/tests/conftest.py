@@ -75,9 +75,9 @@ def start_node(start: Callable[..., subprocess.Popen[str]]) -> Iterator[StartNod
     """Starts a node and attaches to it, such as `start_node("curtain", "--paused")`."""
     nodes: list[catenary.Node] = []
 
-    def start_node(*arguments: str, name: str = "sim") -> catenary.Node:
+    def start_node(*arguments: str, name: str = "sim", forces: bool = False) -> catenary.Node:
         start("sim-node", "run", *arguments, "--name", name)
-        nodes.append(catenary.attach(name, timeout=DEADLINE))
+        nodes.append(catenary.attach(name, timeout=DEADLINE, forces=forces))
         return nodes[-1]
 
     yield start_node

@@ -64,14 +64,12 @@ def test_the_motion_and_the_wrench_of_a_body_move_its_collider_for_a_step() -> N
 def test_a_node_drives_a_body_in_lockstep(start_node: StartNode, tmp_path: Path) -> None:
     scene = tmp_path / "box.toml"
     scene.write_text(SCENE)
-    node = start_node(str(scene), "--paused", "--as-fast-as-possible")
-    assert node.forces_of(node.latest()) is None, "from now on it computes forces"
+    node = start_node(str(scene), "--paused", "--as-fast-as-possible", forces=True)
     with node.lockstep() as turns:
         node.resume()
         for snapshot in turns:
             if snapshot.step == 1:
-                forces = node.forces_of(snapshot)
-                assert forces is not None
-                require_hit(forces)
+                assert snapshot.forces is not None
+                require_hit(snapshot.forces)
                 break
             turns.drive_body(0, (0, 0, 0))

@@ -89,26 +89,47 @@ def test_contacts_carry_the_weight_of_a_particle_on_a_floor() -> None:
     assert forces.impulses.shape == (0, 3)
 
 
-def test_the_forces_of_a_node_are_those_of_the_step_of_a_snapshot(
+def test_a_snapshot_of_a_node_comes_with_the_forces_of_its_step(
     start_node: StartNode, rope: Path
 ) -> None:
-    node = start_node(str(rope), "--paused")
-    first = node.latest().copy()
-    assert node.forces_of(first) is None
+    node = start_node(str(rope), "--paused", forces=True)
+    assert node.latest().forces is None, "no step has led to the initial state"
     with pytest.raises(catenary.Timeout, match="paused"):
         node.forces(timeout=0.0)
+    simulation = catenary.Simulation(rope, forces=True)
+    snapshots = node.snapshots()
+    assert next(snapshots).forces is None
+    for step in range(1, 5):
+        node.step(1)
+        simulation.step()
+        expected = simulation.forces().impulses
+        copy = node.latest().copy()
+        for snapshot in (node.latest(), next(snapshots), copy, simulation.snapshot()):
+            forces = snapshot.forces
+            assert forces is not None
+            assert (forces.step, forces.rate) == (step, 240)
+            assert np.array_equal(forces.impulses, expected)
     node.step(STEPS)
     require_weight(node.forces())
-    assert node.forces().step == STEPS
-    node.step(1)
-    snapshot = node.latest()
-    forces = node.forces_of(snapshot)
-    assert forces is not None and forces.step == snapshot.step == STEPS + 1
-    require_weight(forces)
-    assert node.forces_of(first) is None
-    simulation = catenary.Simulation(rope, forces=True)
-    simulation.step(STEPS + 1)
-    assert np.array_equal(simulation.forces().impulses, forces.impulses)
+    assert node.forces().step == STEPS + 4
+    late = next(snapshots)
+    assert 5 < late.step < STEPS, "the loop has missed snapshots"
+    assert late.forces is not None and late.forces.step == late.step
+
+
+def test_a_snapshot_without_forces_says_how_to_get_them(
+    start_node: StartNode, rope: Path, simulate: Callable[..., Path]
+) -> None:
+    node = start_node(str(rope), "--paused")
+    snapshots = [node.latest(), node.latest().copy()]
+    for snapshot in snapshots:
+        with pytest.raises(catenary.Error, match=r"attach\(..., forces=True\)"):
+            _ = snapshot.forces
+    with pytest.raises(catenary.Error, match=r"Simulation\(..., forces=True\)"):
+        _ = catenary.Simulation(rope).snapshot().forces
+    recording = catenary.open(simulate(str(rope), "--steps", "10"))
+    with pytest.raises(catenary.RecordingError, match="--forces"):
+        _ = recording[5].forces
 
 
 def test_a_recording_has_the_forces_of_each_step_bit_for_bit(
@@ -121,6 +142,9 @@ def test_a_recording_has_the_forces_of_each_step_bit_for_bit(
         simulation.step()
         assert recording.forces(step).step == step
         assert np.array_equal(recording.forces(step).impulses, simulation.forces().impulses)
+        snapshot_forces = recording[step].forces
+        assert snapshot_forces is not None and snapshot_forces.step == step
+        assert np.array_equal(snapshot_forces.impulses, simulation.forces().impulses)
     with pytest.raises(catenary.RecordingError, match="no forces of step 0"):
         recording.forces(0)
     with pytest.raises(KeyError, match=f"no step {STEPS + 1}"):

@@ -95,15 +95,17 @@ def attach(
     domain: str | None = None,
     timeout: float = 0.0,
     client_id: int | None = None,
+    forces: bool = False,
 ) -> Node:
     """Attaches to the node that runs under a name, or waits for it for up to `timeout` seconds.
 
     `domain` is that of `sim-node run --domain`; without it, the environment variable CATENARY_DOMAIN counts.
-    `client_id`, below 2^53, names this client in outcomes and recordings; it is random by default.
+    `client_id`, below 2^53, names this client in outcomes and recordings; it is random by default. With `forces`,
+    each snapshot comes with the forces of its step, which the node then computes until the connection is closed.
 
     Raises `NotRunning` if there is no such node.
     """
-    return Node(name, domain=domain, timeout=timeout, client_id=client_id)
+    return Node(name, domain=domain, timeout=timeout, client_id=client_id, forces=forces)
 
 
 def open(path: str | PathLike[str]) -> Recording:

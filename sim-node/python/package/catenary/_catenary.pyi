@@ -98,6 +98,14 @@ class Snapshot:
     def is_replay(self) -> bool:
         """True if `recorder play` publishes it."""
     @property
+    def forces(self) -> Forces | None:
+        """Forces of the step on colliders, anchors and fixed particles. None if the node did not compute them in this step:
+        before its first step, and in steps before the connection that reads them.
+
+        Raises `Error` without `forces=True` in `attach` or `Simulation`, and `RecordingError` if the recording has none
+        of this step.
+        """
+    @property
     def published_at(self) -> float:
         """Time of publication in seconds, on the clock of `time.monotonic`."""
     @property
@@ -325,6 +333,7 @@ class Node:
         domain: str | None = None,
         timeout: float = 0.0,
         client_id: int | None = None,
+        forces: bool = False,
     ) -> Self: ...
     def another(self) -> Node:
         """Returns another connection to the same node, with an id and a queue of snapshots of its own."""
@@ -369,15 +378,10 @@ class Node:
 
         The node computes them only while a client reads them: the first call waits for the next step, and from then
         on each step costs the node a little more time, until `close`. A paused node has none until its next step, and
-        a replay only those of a recording that was made with `--forces`.
+        a replay only those of a recording that was made with `--forces`. `snapshot.forces` reads from the same queue:
+        a snapshot from before the forces that this returned has none then.
 
         Raises `Timeout` if there are none in time.
-        """
-    def forces_of(self, snapshot: Snapshot) -> Forces | None:
-        """Returns the forces of the step of a snapshot, without waiting, or None if this connection has none.
-
-        It has those since the first call of `forces` or `forces_of`, up to 64 steps back. Call it for snapshots in
-        their order: forces before the last read ones are gone.
         """
     def send(self, action: Action) -> int:
         """Sends an action without waiting. Returns its sequence number, for `outcome`."""

@@ -6,6 +6,7 @@ use recorder::ForcesRow;
 use sim_contract::PlainF32;
 
 use crate::convert::rows;
+use crate::error::Error;
 
 /// The impulses of a step on colliders, anchors and fixed particles.
 ///
@@ -79,6 +80,16 @@ fn vectors(
 ) -> PyResult<Py<PyArray2<f32>>> {
     let vectors: Vec<_> = vectors.map(|vector| vector.map(|number| number.0)).collect();
     Ok(rows(py, &vectors)?.unbind())
+}
+
+/// Returns the forces that a node has published.
+///
+/// # Errors
+/// They are of a kind that this module does not know.
+pub(crate) fn forces_row(forces: &sim_contract::Forces) -> PyResult<ForcesRow> {
+    let unknown =
+        || Error::new_err("the node publishes forces of another version: update it or this module");
+    ForcesRow::new(forces.header.step, &forces.rows).ok_or_else(unknown)
 }
 
 #[pymethods]

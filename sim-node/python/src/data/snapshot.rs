@@ -3,10 +3,14 @@
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
+use recorder::ForcesRow;
 use sim_contract::{ParticleState, SnapshotFlags, SnapshotHeader};
 
+use crate::data::forces::Forces;
 use crate::data::view;
+use crate::error::Error;
 use crate::process::OfProcess;
+use crate::recording::Recording;
 
 /// The place of the particles. It never changes.
 #[derive(Debug)]
@@ -15,6 +19,30 @@ enum Memory {
     Shared(OfProcess<sim_contract::Snapshot>),
     /// In the memory of this process.
     Own(Vec<ParticleState>),
+}
+
+/// Steps per second.
+type Rate = u32;
+
+/// Where the forces of the step come from.
+#[derive(Debug)]
+pub(crate) enum ForcesSource {
+    /// Nobody asked for them. The text names the way.
+    Unread(&'static str),
+    /// `None` if they were not computed in this step.
+    Read(Option<(ForcesRow, Rate)>),
+    /// The recording is read once they are needed.
+    Recorded(Py<Recording>),
+}
+
+impl ForcesSource {
+    fn clone_ref(&self, py: Python<'_>) -> Self {
+        match self {
+            Self::Unread(cure) => Self::Unread(cure),
+            Self::Read(row) => Self::Read(row.clone()),
+            Self::Recorded(recording) => Self::Recorded(recording.clone_ref(py)),
+        }
+    }
 }
 
 /// The first field of each vector and the numbers of [`ParticleState`], in units of 4 bytes.
@@ -32,16 +60,21 @@ const FLAGS: usize = 7;
 pub(crate) struct Snapshot {
     header: SnapshotHeader,
     memory: Memory,
+    forces: ForcesSource,
 }
 
 impl Snapshot {
-    pub(crate) fn shared(snapshot: sim_contract::Snapshot) -> Self {
+    pub(crate) fn shared(snapshot: sim_contract::Snapshot, forces: ForcesSource) -> Self {
         let header = *snapshot.header();
-        Self { header, memory: Memory::Shared(OfProcess::new("snapshot", snapshot)) }
+        Self { header, memory: Memory::Shared(OfProcess::new("snapshot", snapshot)), forces }
     }
 
-    pub(crate) fn own(header: SnapshotHeader, particles: Vec<ParticleState>) -> Self {
-        Self { header, memory: Memory::Own(particles) }
+    pub(crate) fn own(
+        header: SnapshotHeader,
+        particles: Vec<ParticleState>,
+        forces: ForcesSource,
+    ) -> Self {
+        Self { header, memory: Memory::Own(particles), forces }
     }
 
     pub(crate) fn header(&self) -> &SnapshotHeader {
@@ -91,6 +124,26 @@ impl Snapshot {
     #[getter]
     fn flags<'py>(this: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray1<u32>>> {
         view::numbers(this, FLAGS)
+    }
+
+    /// Forces of the step on colliders, anchors and fixed particles. None if the node did not compute them in this step:
+    /// before its first step, and in steps before the connection that reads them.
+    ///
+    /// Raises `Error` without `forces=True` in `attach` or `Simulation`, and `RecordingError` if the recording has none
+    /// of this step.
+    #[getter]
+    fn forces(&self, py: Python<'_>) -> PyResult<Option<Forces>> {
+        match &self.forces {
+            ForcesSource::Unread(cure) => {
+                Err(Error::new_err(format!("this snapshot was read without its forces: {cure}")))
+            }
+            ForcesSource::Read(row) => {
+                row.as_ref().map(|(row, rate)| Forces::new(py, row, *rate)).transpose()
+            }
+            ForcesSource::Recorded(recording) => {
+                recording.get().forces(py, self.header.step).map(Some)
+            }
+        }
     }
 
     /// Number of the step in its run.
@@ -183,8 +236,8 @@ impl Snapshot {
     }
 
     /// Returns the snapshot in the memory of this process, so that it can be kept.
-    fn copy(&self) -> PyResult<Self> {
-        Ok(Self::own(self.header, self.to_vec()?))
+    fn copy(&self, py: Python<'_>) -> PyResult<Self> {
+        Ok(Self::own(self.header, self.to_vec()?, self.forces.clone_ref(py)))
     }
 
     fn __len__(&self) -> usize {
