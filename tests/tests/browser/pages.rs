@@ -57,8 +57,10 @@ fn a_link_asks_before_it_loads_its_scene_and_then_shows_its_view() {
 fn two_pages_share_one_simulation() {
     let mut rig = Rig::new(&["curtain"], "");
     let other = rig.another_tab("");
-    let at = rig.tab.camera().project(rig.state().particles[TARGET].position);
+    // The curtain swings. In a pause the press falls on the particle that the page shows there.
+    let at = rig.tab.camera().project(rig.pause().particles[TARGET].position);
     rig.tab.press(at, Button::Left);
+    rig.tab.key(' ');
     let is_grabbed =
         format!("viewer.pins.some(([one, flags]) => one === {TARGET} && (flags & 2) !== 0)");
     other.wait(&is_grabbed);
