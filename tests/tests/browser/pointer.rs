@@ -269,9 +269,11 @@ fn a_finger_grabs_a_particle_and_a_long_press_pins_one() {
     let touch = json!({ "enabled": true, "maxTouchPoints": 1 });
     rig.tab.call("Emulation.setTouchEmulationEnabled", touch);
     let camera = rig.tab.camera();
-    let from = camera.project(rig.state().particles[TARGET].position);
+    // The curtain swings. In a pause the press falls on the particle that the page shows there.
+    let from = camera.project(rig.pause().particles[TARGET].position);
     let to = [from[0] + 40.0, from[1] - 30.0];
     rig.tab.finger("touchStart", Some(from));
+    rig.tab.key(' ');
     rig.wait_for_state("the grab", |state| is_grabbed(&state.particles[TARGET]));
     rig.tab.finger("touchMove", Some(to));
     rig.wait_for_state("the particle under the finger", |state| {
@@ -280,7 +282,7 @@ fn a_finger_grabs_a_particle_and_a_long_press_pins_one() {
     rig.tab.finger("touchEnd", None);
     rig.wait_for_state("the release", |state| !state.particles.iter().any(is_grabbed));
 
-    // The curtain still swings. In a pause the press falls on the particle that the page shows there.
+    // It swings again.
     let pressed = TARGET + 1;
     let at = camera.project(rig.pause().particles[pressed].position);
     rig.tab.finger("touchStart", Some(at));
