@@ -8,10 +8,11 @@
 use std::fs;
 use std::path::PathBuf;
 
+use recorder::simulation::forces_row;
 use recorder::{
-    Closing, CollidersRow, Frame, FrameReader, LogEnd, LogOptions, LogReader, LogWriter, Message,
-    OutcomeRow, RunDescription, StepRow, SurfaceRow, Tape, TapeError, TearsRow, TopologyRow, Up,
-    state_hash,
+    Closing, CollidersRow, ContentSelection, Frame, FrameReader, LogEnd, LogOptions, LogReader,
+    LogWriter, Message, OutcomeRow, RunDescription, StepRow, SurfaceRow, Tape, TapeError, TearsRow,
+    TopologyRow, Up, state_hash,
 };
 use sim_contract::{
     Action, Command, ConstraintState, LoadHeader, Outcome, ParticleState, TearCause, TornConstraint,
@@ -51,10 +52,12 @@ struct Expected {
 struct Style {
     every: u64,
     has_keyframes: bool,
+    has_forces: bool,
     chunk_size_bytes: u64,
 }
 
-const PLAIN: Style = Style { every: 1, has_keyframes: true, chunk_size_bytes: 6000 };
+const PLAIN: Style =
+    Style { every: 1, has_keyframes: true, has_forces: false, chunk_size_bytes: 6000 };
 
 fn expected(solver: &Solver, step: u64) -> Expected {
     Expected {
@@ -89,6 +92,9 @@ fn updates(solver: &Solver, step: u64, style: Style) -> Vec<Message> {
     if RESETS.contains(&step) {
         messages.push(reset_outcome(step));
     }
+    if style.has_forces && step > 0 {
+        messages.push(Message::Forces(forces_row(solver, step).unwrap()));
+    }
     messages
 }
 
@@ -120,6 +126,7 @@ fn topology(solver: &Solver) -> Message {
 fn written(style: Style) -> (Vec<u8>, Vec<Expected>) {
     let scene = Scene::from_toml(SCENE, "scene.toml").unwrap();
     let mut solver = Solver::new(&scene);
+    solver.compute_forces(style.has_forces);
     let run = RunDescription {
         run_id: 7,
         epoch_ns: 1_700_000_000_000_000_001,
@@ -134,7 +141,13 @@ fn written(style: Style) -> (Vec<u8>, Vec<Expected>) {
         contract_version: 1,
         recorder_version: "0.1.0".to_owned(),
     };
-    let options = LogOptions { chunk_size_bytes: style.chunk_size_bytes, ..LogOptions::default() };
+    let selection = if style.has_forces {
+        ContentSelection::default().with_forces()
+    } else {
+        ContentSelection::default()
+    };
+    let options =
+        LogOptions { selection, chunk_size_bytes: style.chunk_size_bytes, ..LogOptions::default() };
     let mut log = LogWriter::create(Vec::new(), options, &run, SCENE.as_bytes(), 0).unwrap();
     log.write(&topology(&solver), 0).unwrap();
     let surface = SurfaceRow { step: 0, triangles: Vec::new() };
@@ -261,6 +274,30 @@ fn neighboring_steps_are_found_across_chunks() {
 }
 
 /// Reads a file from its start, and returns each frame with its step.
+#[test]
+fn the_forces_of_any_step_are_found_where_there_are_any() {
+    // In the smaller chunks, the forces are in another one than the snapshot.
+    for chunk_size_bytes in [6000, 1] {
+        let (bytes, _) = written(Style { has_forces: true, chunk_size_bytes, ..PLAIN });
+        let file = TestFile::new(&format!("forces-{chunk_size_bytes}"), &bytes);
+        let mut tape = file.open().unwrap();
+        let scene = Scene::from_toml(SCENE, "scene.toml").unwrap();
+        let mut solver = Solver::new(&scene);
+        solver.compute_forces(true);
+        let mut all = vec![None];
+        for step in 1..=STEPS {
+            advance(&mut solver, step);
+            all.push(forces_row(&solver, step));
+        }
+        assert!(all[100].as_ref().unwrap().impulses.iter().any(|one| one[1].0 != 0.0));
+        for (step, row) in tour().map(|step| (step, &all[usize::try_from(step).unwrap()])) {
+            assert_eq!(&tape.forces_at(step).unwrap(), row, "step {step}");
+        }
+    }
+    let file = TestFile::new("no-forces", &written(PLAIN).0);
+    assert_eq!(file.open().unwrap().forces_at(100).unwrap(), None);
+}
+
 fn frames(bytes: &[u8]) -> Vec<(u64, Frame)> {
     let mut reader = FrameReader::new(LogReader::new(bytes).unwrap());
     let frames = std::iter::from_fn(|| reader.next_frame().unwrap());

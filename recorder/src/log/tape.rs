@@ -15,7 +15,9 @@ use super::index::IndexedLog;
 use super::read::file_source::FileSource;
 use super::read::frames::FrameReader;
 use super::read::read_error::{LogEnd, ReadError};
-use super::rows::{CollidersRow, ParametersRow, StatusRow, StepRow, SurfaceRow, TopologyRow};
+use super::rows::{
+    CollidersRow, ForcesRow, ParametersRow, StatusRow, StepRow, SurfaceRow, TopologyRow,
+};
 use super::run::RunDescription;
 use super::tears::TearTracker;
 use super::topic::Topic;
@@ -202,6 +204,23 @@ impl Tape {
             digest.statuses.iter().rfind(|row| row.step <= step).cloned()
         })?;
         Ok(TapeState { row, has_readable_row, particles, torn, colliders, parameters, status })
+    }
+
+    /// Returns the forces of a recorded step. `None` if the file has none of it: it was recorded without them, or no
+    /// step has led to its state.
+    ///
+    /// # Errors
+    /// If the operating system reports an error.
+    pub fn forces_at(&mut self, step: u64) -> Result<Option<ForcesRow>, ReadError> {
+        let Some(position) = self.find(step)? else { return Ok(None) };
+        // They precede the snapshot, possibly in an earlier chunk.
+        let chunks = self.reader.chunks.with_topic(Topic::Forces).backward_from(position.chunk);
+        for chunk in chunks.take(2) {
+            if let Some(row) = self.reader.forces(chunk, step)? {
+                return Ok(Some(row));
+            }
+        }
+        Ok(None)
     }
 
     /// Returns the newest keyframe up to `step` and its step, as far as it is readable.

@@ -1,7 +1,7 @@
 //! Recordings, from which snapshots are read at any step.
 
 use std::error::Error as StdError;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use numpy::{PyArray1, PyArray2};
@@ -9,8 +9,8 @@ use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use recorder::{
-    ForcesRow, FrameReader, LogReader, Message, ReadError, RunDescription, StepRow, Tape,
-    TapeError, TapeState, complete_state,
+    LogReader, Message, ReadError, RunDescription, StepRow, Tape, TapeError, TapeState,
+    complete_state,
 };
 use sim_contract::SnapshotHeader;
 
@@ -90,27 +90,6 @@ impl Recording {
     fn malformed(&self, topic: &str) -> PyErr {
         RecordingError::new_err(format!("{}: {topic} is malformed", self.path()))
     }
-}
-
-/// Returns the forces of a step, if the file has them.
-fn forces_at(path: &Path, tape: &mut Tape, step: u64) -> Result<Option<ForcesRow>, ReadError> {
-    let mut frames = FrameReader::new(LogReader::open(path)?);
-    if step > tape.first_step() {
-        tape.wind(&mut frames, step - 1)?;
-    }
-    while let Some(frame) = frames.next_frame()? {
-        for update in frame.updates {
-            if let Message::Forces(row) = update
-                && row.step == step
-            {
-                return Ok(Some(row));
-            }
-        }
-        if frame.row.step >= step {
-            break;
-        }
-    }
-    Ok(None)
 }
 
 /// Returns the header of a recorded snapshot.
@@ -261,7 +240,7 @@ impl Recording {
         #[pyo3(from_py_with = arguments::step)] step: u64,
     ) -> PyResult<Forces> {
         self.require_step(step)?;
-        let row = self.read(py, |tape| forces_at(&self.path, tape, step))?;
+        let row = self.read(py, |tape| tape.forces_at(step))?;
         let row = row.ok_or_else(|| {
             RecordingError::new_err(format!(
                 "{} has no forces of step {step}: `recorder record --forces` and `recorder simulate --forces` \

@@ -3,11 +3,11 @@
 
 use std::time::Duration;
 
-use integration_tests::wait_for;
+use integration_tests::{Process, Program, Sandbox, wait_for};
 use serde_json::Value;
 use sim_contract::Client;
 
-use crate::support::{Rig, is_force};
+use crate::support::{Button, ReplayRig, Rig, Tab, is_force};
 
 /// A sheet of 9 x 8 particles that hangs from its upper row, above a floor that it does not reach.
 const HANGING: &str = "
@@ -45,9 +45,9 @@ struct Arrow {
     force: [f64; 3],
 }
 
-fn arrows(rig: &Rig) -> Vec<Arrow> {
+fn arrows(tab: &Tab) -> Vec<Arrow> {
     let vector = |value: &Value| [0, 1, 2].map(|axis| value[axis].as_f64().unwrap());
-    let drawn = rig.tab.evaluate("viewer.arrows");
+    let drawn = tab.evaluate("viewer.arrows");
     let arrow = |one: &Value| Arrow {
         kind: one["kind"].as_str().unwrap().to_owned(),
         index: serde_json::from_value(one["index"].clone()).unwrap(),
@@ -57,13 +57,19 @@ fn arrows(rig: &Rig) -> Vec<Arrow> {
     drawn.as_array().unwrap().iter().map(arrow).collect()
 }
 
+fn assert_weight(shown: &[Arrow]) {
+    let sum = [0, 1, 2].map(|axis| shown.iter().map(|one| one.force[axis]).sum::<f64>());
+    assert!((sum[1] + WEIGHT).abs() <= 1e-3 * WEIGHT, "{sum:?}");
+    assert!(sum[0].abs() + sum[2].abs() <= 1e-3 * WEIGHT, "{sum:?}");
+}
+
 /// Makes steps until the page draws arrows, and returns those of the last step. The first step after a
 /// request can precede the reader.
 fn step_until_drawn(rig: &mut Rig) -> Vec<Arrow> {
     wait_for("arrows", || {
         rig.step(1);
         rig.settled();
-        Some(arrows(rig)).filter(|drawn| !drawn.is_empty())
+        Some(arrows(&rig.tab)).filter(|drawn| !drawn.is_empty())
     })
 }
 
@@ -84,7 +90,7 @@ fn the_arrows_of_a_hanging_sheet_add_up_to_its_weight_and_end_with_their_toggle(
     assert!(!are_published(&mut rig), "no page has asked for forces");
     let area = rig.tab.camera().area();
     let drawn = |rig: &Rig| rig.tab.screenshot().count(&area, is_force);
-    assert_eq!((arrows(&rig).len(), drawn(&rig)), (0, 0));
+    assert_eq!((arrows(&rig.tab).len(), drawn(&rig)), (0, 0));
 
     rig.tab.click("#forces");
     rig.tab.wait("document.querySelector('#force-legend').checkVisibility()");
@@ -98,9 +104,7 @@ fn the_arrows_of_a_hanging_sheet_add_up_to_its_weight_and_end_with_their_toggle(
         let apart = (0..3).map(|axis| (arrow.from[axis] - position[axis]).abs());
         assert!(apart.fold(0.0, f64::max) < 1e-5, "{arrow:?} begins at {position:?}");
     }
-    let sum = [0, 1, 2].map(|axis| shown.iter().map(|one| one.force[axis]).sum::<f64>());
-    assert!((sum[1] + WEIGHT).abs() <= 1e-3 * WEIGHT, "{sum:?}");
-    assert!(sum[0].abs() + sum[2].abs() <= 1e-3 * WEIGHT, "{sum:?}");
+    assert_weight(&shown);
     assert!(drawn(&rig) > 9 * 40, "{} px", drawn(&rig));
     let legend = rig.tab.evaluate("document.querySelector('#force-scale').textContent");
     assert!(legend.as_str().unwrap().ends_with(" N"), "{legend}");
@@ -119,7 +123,7 @@ fn the_arrows_of_a_hanging_sheet_add_up_to_its_weight_and_end_with_their_toggle(
     rig.tab.key('n');
     wait_for("the end of the reading", || (!are_published(&mut rig)).then_some(()));
     rig.settled();
-    assert_eq!((arrows(&rig).len(), drawn(&rig)), (0, 0));
+    assert_eq!((arrows(&rig.tab).len(), drawn(&rig)), (0, 0));
     assert_eq!(
         rig.tab.evaluate("document.querySelector('#force-legend').checkVisibility()"),
         false
@@ -130,4 +134,40 @@ fn the_arrows_of_a_hanging_sheet_add_up_to_its_weight_and_end_with_their_toggle(
     wait_for("the reading of the other page", || are_published(&mut rig).then_some(()));
     drop(other);
     wait_for("the end of the reading", || (!are_published(&mut rig)).then_some(()));
+}
+
+#[test]
+#[ignore = "needs Chromium"]
+fn a_replay_shows_the_recorded_forces_of_the_step_on_show() {
+    let sandbox = Sandbox::new();
+    let (scene, file) = (sandbox.write("hanging.toml", HANGING), sandbox.path("run.mcap"));
+    let steps = SETTLED.to_string();
+    let args = ["simulate", &scene, "--steps", &steps, "--forces", "-o", &file];
+    Process::run(Program::Recorder, &sandbox, &args).success();
+
+    let replay = ReplayRig::open(sandbox, &file, "");
+    let tab = &replay.tab;
+    let (from, to) = (tab.pixel("#seek", 0.1), tab.pixel("#seek", 0.98));
+    tab.press(from, Button::Left);
+    tab.stroke(from, to, 8);
+    tab.release(to);
+    let step = tab.number("document.querySelector('#seek').valueAsNumber");
+    assert!(step > 0.9 * SETTLED as f64, "{step}");
+    tab.wait(&format!("viewer.paused && viewer.step === {step}"));
+    assert!(arrows(tab).is_empty());
+    // The step that is on show already is shown again with its forces.
+    tab.key('n');
+    tab.wait("viewer.arrows.length > 0");
+    let shown = arrows(tab);
+    assert_eq!(shown.len(), COLUMNS);
+    assert_weight(&shown);
+    tab.key(',');
+    tab.wait(&format!("viewer.step === {step} - 1 && viewer.arrows.length === {COLUMNS}"));
+
+    // No step has led to the first state.
+    tab.press(to, Button::Left);
+    tab.stroke(to, tab.pixel("#seek", 0.0), 8);
+    tab.release(tab.pixel("#seek", 0.0));
+    tab.wait("viewer.step === 0 && viewer.arrows.length === 0");
+    tab.wait("document.querySelector('#force-scale').textContent === 'none recorded of this step'");
 }

@@ -10,16 +10,22 @@ use super::digest::{Digest, DigestCache};
 use crate::log::index::IndexedLog;
 use crate::log::message::Message;
 use crate::log::read::read_error::ReadError;
+use crate::log::rows::ForcesRow;
 use crate::log::topic::Topic;
 
-/// Chunks whose particles are cached: the one that is played and the one before it.
-const PARTICLE_CHUNKS_MAX: usize = 2;
+/// Chunks whose particles and forces are cached: the one that is played and the one before it.
+const STEPS_CHUNKS_MAX: usize = 2;
 
 /// The digest of a chunk that cannot be read.
 static EMPTY_DIGEST: Digest = Digest::empty();
 
-/// Steps and their particles.
-type Snapshots = Vec<(u64, Arc<Vec<ParticleState>>)>;
+/// The particles and forces of the steps in a chunk, which are too large for a digest.
+#[derive(Debug)]
+struct Steps {
+    chunk: usize,
+    snapshots: Vec<(u64, Arc<Vec<ParticleState>>)>,
+    forces: Vec<ForcesRow>,
+}
 
 /// Reads chunks on demand and caches their content. A chunk that cannot be read counts as empty.
 #[derive(Debug)]
@@ -27,8 +33,8 @@ pub(super) struct ChunkReader {
     log: IndexedLog,
     pub(super) chunks: Chunks,
     digests: DigestCache,
-    /// The snapshots of the chunks that were read last, newest last.
-    particles: VecDeque<(usize, Snapshots)>,
+    /// The steps of the chunks that were read last, newest last.
+    steps: VecDeque<Steps>,
     /// Errors that [`Self::drain_faults`] has not returned yet.
     faults: Vec<String>,
 }
@@ -40,7 +46,7 @@ impl ChunkReader {
             log,
             chunks,
             digests: DigestCache::default(),
-            particles: VecDeque::new(),
+            steps: VecDeque::new(),
             faults: Vec::new(),
         }
     }
@@ -75,13 +81,27 @@ impl ChunkReader {
         chunk: usize,
         step: u64,
     ) -> Result<Option<Arc<Vec<ParticleState>>>, ReadError> {
-        if !self.particles.iter().any(|(cached, _)| *cached == chunk) {
-            self.read(chunk)?;
-        }
-        let mut snapshots =
-            self.particles.iter().filter(|(cached, _)| *cached == chunk).flat_map(|(_, all)| all);
+        let mut snapshots = self.steps(chunk)?.into_iter().flat_map(|steps| &steps.snapshots);
         let snapshot = snapshots.find(|(snapshot_step, _)| *snapshot_step == step);
         Ok(snapshot.map(|(_, particles)| Arc::clone(particles)))
+    }
+
+    /// Returns the forces of a step, if the chunk has them.
+    pub(super) fn forces(
+        &mut self,
+        chunk: usize,
+        step: u64,
+    ) -> Result<Option<ForcesRow>, ReadError> {
+        let mut rows = self.steps(chunk)?.into_iter().flat_map(|steps| &steps.forces);
+        Ok(rows.find(|row| row.step == step).cloned())
+    }
+
+    /// Returns the steps of a chunk. Reads the chunk if they are not cached.
+    fn steps(&mut self, chunk: usize) -> Result<Option<&Steps>, ReadError> {
+        if !self.steps.iter().any(|steps| steps.chunk == chunk) {
+            self.read(chunk)?;
+        }
+        Ok(self.steps.iter().find(|steps| steps.chunk == chunk))
     }
 
     /// Returns the newest keyframe of a chunk up to a step.
@@ -123,7 +143,8 @@ impl ChunkReader {
             }
             Err(error) => return Err(error),
         };
-        let (mut digest, mut snapshots) = (Digest::default(), Vec::new());
+        let mut digest = Digest::default();
+        let mut steps = Steps { chunk, snapshots: Vec::new(), forces: Vec::new() };
         for logged in messages {
             if let Message::Particles { step, particles } = &logged.message
                 && particles.len() != self.log.run().particle_count as usize
@@ -135,8 +156,12 @@ impl ChunkReader {
                 continue;
             }
             digest.add(&logged.message);
-            if let Message::Particles { step, particles } = logged.message {
-                snapshots.push((step, Arc::new(particles)));
+            match logged.message {
+                Message::Particles { step, particles } => {
+                    steps.snapshots.push((step, Arc::new(particles)));
+                }
+                Message::Forces(row) => steps.forces.push(row),
+                _ => {}
             }
         }
         // A chunk that is read again after its digest was dropped reports its faults only once.
@@ -145,10 +170,10 @@ impl ChunkReader {
         }
         self.chunks.set_span(chunk, &digest.snapshots);
         self.digests.insert(chunk, digest);
-        self.particles.retain(|(cached, _)| *cached != chunk);
-        self.particles.push_back((chunk, snapshots));
-        if self.particles.len() > PARTICLE_CHUNKS_MAX {
-            self.particles.pop_front();
+        self.steps.retain(|one| one.chunk != chunk);
+        self.steps.push_back(steps);
+        if self.steps.len() > STEPS_CHUNKS_MAX {
+            self.steps.pop_front();
         }
         Ok(())
     }

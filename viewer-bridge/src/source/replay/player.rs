@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use recorder::{ReadError, TapeError, TapeState};
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
-use sim_contract::{ParameterValues, Reason};
+use sim_contract::{Forces, ForcesHeader, ParameterValues, Reason};
 
 use super::check::Report;
 use super::open::Recording;
@@ -40,6 +40,8 @@ pub(super) struct Player<'a> {
     playhead: Playhead,
     /// The state at the place of the playhead.
     state: TapeState,
+    /// The step whose forces were read, and those that the recording has of it.
+    forces: Option<(u64, Option<Forces>)>,
     resets: ResetFinder,
     /// The parameters that were published last.
     parameters: Option<ParametersText>,
@@ -82,6 +84,7 @@ impl<'a> Player<'a> {
             playhead,
             resets: ResetFinder::new(state.beginning()),
             state,
+            forces: None,
             parameters: None,
             answers: Vec::new(),
             is_playback_changed: true,
@@ -212,9 +215,29 @@ impl<'a> Player<'a> {
                 Err(_) => {}
             }
         }
+        self.read_forces()?;
         for fault in self.recording.tape.drain_faults() {
             let text = &format!("{}: {fault}; it is skipped", self.recording.file);
             self.sinks.publish(&Update::Notice { level: Level::Warning, text });
+        }
+        Ok(())
+    }
+
+    /// Reads the forces of the state while a client wants them. A state that is on show without them is shown again.
+    fn read_forces(&mut self) -> Result<(), ReadError> {
+        let step = self.state.row.step;
+        if !self.sinks.has_demand(Demand::Forces) {
+            self.forces = None;
+        } else if self.forces.as_ref().is_none_or(|(read_step, _)| *read_step != step) {
+            let row = self.recording.tape.forces_at(step)?;
+            let (run_id, rate_hz) =
+                (self.recording.tape.run().run_id, self.recording.tape.run().rate_hz);
+            let header = ForcesHeader { run_id, step, rate_hz, ..ForcesHeader::default() };
+            let forces = row.map(|row| Forces { header, rows: row.rows() });
+            if forces.is_some() {
+                self.shown_step = None;
+            }
+            self.forces = Some((step, forces));
         }
         Ok(())
     }
@@ -279,7 +302,7 @@ impl<'a> Player<'a> {
             flags: frame_flag::REPLAY,
             publish_monotonic_ns: now_ns,
             particles: &self.state.particles,
-            forces: None,
+            forces: self.forces.as_ref().and_then(|(_, forces)| forces.as_ref()),
         };
         self.shown.show(self.sinks, state);
     }

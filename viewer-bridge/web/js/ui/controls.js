@@ -34,7 +34,6 @@ export class Controls {
     this.help = find("help-dialog", HTMLDialogElement);
     this.modes = [...find("modes", HTMLElement).querySelectorAll("button")];
     this.panelToggle = find("panel-toggle", HTMLButtonElement);
-    this.forces = find("forces", HTMLButtonElement);
     this.listen();
     listenToKeys(this.keymap());
     returnFocus(input.canvas);
@@ -75,7 +74,7 @@ export class Controls {
       h: () => views.toggle("heat"),
       e: () => views.toggle("sticks"),
       k: () => views.toggle("particles"),
-      n: () => { if (!this.forces.disabled) views.toggle("forces"); },
+      n: () => views.toggle("forces"),
       g: () => this.setMode("grab"),
       b: () => this.setMode("brush"),
       c: () => this.setMode("cut"),
@@ -188,7 +187,6 @@ export class Controls {
     enable(this.step, gone);
     enable(this.reset, recorded("A recording cannot be reset. Use the timeline to go back."));
     for (const button of this.modes) enable(button, recorded("A recording cannot be changed."));
-    enable(this.forces, simulation.isReplay ? "Forces are those of a running node, or of “recorder play”." : "");
     this.sceneName.textContent = this.name() ?? "No scene";
     this.scene.value = this.name() ?? "";
     enable(this.scene, recorded("A recording has one scene."));

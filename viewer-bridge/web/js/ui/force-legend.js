@@ -22,7 +22,7 @@ export class ForceLegend {
   /** Asks for forces or ends the request, and shows the scale at the middle of the view. */
   tick() {
     const { simulation, renderer, commands } = this.app;
-    const isWanted = renderer.toggles.forces && simulation.isConnected && !simulation.isReplay;
+    const isWanted = renderer.toggles.forces && simulation.isConnected;
     if (isWanted !== this.isAsked && commands.stream("forces", { is_on: isWanted })) this.isAsked = isWanted;
     if (this.legend.hidden === isWanted) this.legend.hidden = !isWanted;
     if (isWanted) this.show();
@@ -34,11 +34,17 @@ export class ForceLegend {
     const newtonsPerPixel = camera.unitsPerPixel(camera.target, renderer.viewport) / unitsPerNewton;
     const newtons = niceFloor(LENGTH_MAX * newtonsPerPixel);
     const width = simulation.forces === null || unitsPerNewton === 0 ? 0 : newtons / newtonsPerPixel;
-    const waiting = simulation.isPaused ? "after the next step" : "waiting";
-    setText(this.scale, width === 0 ? waiting : readable(newtons, "N"));
+    setText(this.scale, width === 0 ? absence(simulation) : readable(newtons, "N"));
     const pixels = `${width.toFixed(1)}px`;
     if (this.arrow.style.width !== pixels) this.arrow.style.width = pixels;
   }
+}
+
+/** Says why there are no arrows. @param {import("../state/simulation.js").Simulation} simulation */
+function absence({ forces, isReplay, isPaused }) {
+  if (forces !== null) return "no force";
+  if (isReplay) return "none recorded of this step";
+  return isPaused ? "after the next step" : "waiting";
 }
 
 /** @param {HTMLElement} element @param {string} text */
