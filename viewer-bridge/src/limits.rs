@@ -55,6 +55,8 @@ pub const GRABS_PER_CLIENT_MAX: usize = 16;
 pub const STEPS_AT_ONCE_MAX: u32 = 10_000;
 /// Largest scene whose positions are sent as f32 to a page that leaves the choice to the server.
 pub const F32_PARTICLES_MAX: usize = 4096;
+/// Shapes of a scene that pages learn of. They only draw the others more plainly.
+pub const SHAPES_MAX: usize = 4096;
 /// Marks on a timeline.
 pub const MARKS_MAX: usize = 4096;
 

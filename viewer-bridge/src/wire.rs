@@ -21,6 +21,6 @@ pub use frame::{
     Bounds, Format, Frame, FrameHead, FrameLimits, encode as encode_frame, frame_flag,
 };
 pub use header::{KIND_VERSION, Kind, Stamp};
-pub use scene::{Scene, SceneText, scene_flag};
+pub use scene::{Scene, SceneText, ShapeText, scene_flag};
 pub use small::{Colliders, FlaggedParticle, Pins, Tear};
 pub use statistics::{Percentiles, Statistics, statistics_flag};

@@ -21,7 +21,7 @@ use viewer_bridge::message::{
 use viewer_bridge::scene::catalog::Catalog;
 use viewer_bridge::wire::{
     Bounds, Colliders, Forces, Format, FrameHead, FrameLimits, Message, Percentiles, Pins, Scene,
-    SceneText, Stamp, Statistics, Tear, decode, encode_frame, frame_flag, scene_flag,
+    SceneText, ShapeText, Stamp, Statistics, Tear, decode, encode_frame, frame_flag, scene_flag,
 };
 
 const STAMP: Stamp = Stamp { epoch: 3, step: 1200 };
@@ -48,6 +48,7 @@ fn scene() -> Scene {
             unit: "m".to_owned(),
             up: "y".to_owned(),
             run_id: "0123456789abcdef".to_owned(),
+            shapes: vec![ShapeText { shape: "rope".to_owned(), first: 1, count: 3 }],
         },
         collider_meshes: [(2, triangle_mesh())].into(),
         ..Scene::default()

@@ -9,6 +9,7 @@
 )]
 
 mod access;
+mod effects;
 mod first_minute;
 mod forces;
 mod pages;

@@ -1,6 +1,7 @@
 //! The picture: the cloth is drawn, particles are drawn where the node has them, and errors of the page
 //! are detected.
 
+use integration_tests::ctl;
 use serde_json::json;
 
 use crate::support::{Camera, Picture, Rig, distance, is_cloth, is_particle, is_pin};
@@ -120,6 +121,37 @@ impl ShownStep {
         let positions = state.particles.iter().map(|one| one.position).collect();
         Self { positions, picture, camera }
     }
+}
+
+#[test]
+#[ignore = "needs Chromium"]
+fn fit_view_ignores_what_has_fallen_away_and_a_reset_restores_the_first_view() {
+    let mut rig = Rig::new(&["rope", "--paused"], "");
+    let view = "JSON.stringify([viewer.camera.target, viewer.camera.distance].flat().map(one => one.toPrecision(4)))";
+    let first = rig.tab.evaluate(view);
+    // The lower half of the rope falls.
+    ctl(&rig.sandbox, &["cut", "20"]);
+    rig.step(480);
+    let state = rig.settled();
+    assert!(state.particles[40].position[1] < -10.0);
+    rig.tab.key('f');
+    rig.tab.pass_animation_frames(2);
+    assert_ne!(rig.tab.evaluate(view), first);
+    let camera = rig.tab.camera();
+    let area = camera.area();
+    let pixels: Vec<_> =
+        state.particles[..21].iter().map(|one| camera.project(one.position)).collect();
+    let extent = |axis: usize| {
+        let all = pixels.iter().map(|pixel| pixel[axis]);
+        (all.clone().fold(f64::MAX, f64::min), all.fold(f64::MIN, f64::max))
+    };
+    let [(left, right), (top, bottom)] = [0, 1].map(extent);
+    assert!(left > area.x && right < area.x + area.width && top > area.y, "{pixels:?}");
+    let filled = ((right - left) / area.width).max((bottom - top) / area.height);
+    assert!((0.6..1.0).contains(&filled), "the rope fills {filled} of the picture");
+
+    rig.tab.key('r');
+    rig.tab.wait(&format!("viewer.step > {} && {view} === {first}", state.step));
 }
 
 #[test]

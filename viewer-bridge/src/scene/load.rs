@@ -68,6 +68,7 @@ impl Load {
                 unit: summary.unit.clone(),
                 up: summary.up.name().to_owned(),
                 run_id: format!("{:016x}", self.header.run_id),
+                shapes: summary.shapes.clone(),
             },
             collider_meshes: summary.collider_meshes.clone(),
             ..Scene::default()

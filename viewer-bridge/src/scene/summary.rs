@@ -1,8 +1,13 @@
 //! The part of a scene that a viewer needs.
 
+use std::ops::Range;
+
 use sim_contract::ParameterValues;
 use sim_solver::Scene;
-use sim_solver::scene::{ColliderMeshes, Up};
+use sim_solver::scene::{ColliderMeshes, Shape, Up};
+
+use crate::limits::SHAPES_MAX;
+use crate::wire::ShapeText;
 
 /// The part of a scene that a viewer needs.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,6 +26,8 @@ pub struct SceneSummary {
     pub parameters: ParameterValues,
     /// Triangles of the colliders that are meshes.
     pub collider_meshes: ColliderMeshes,
+    /// The generated shapes, at most [`SHAPES_MAX`].
+    pub shapes: Vec<ShapeText>,
 }
 
 impl SceneSummary {
@@ -31,6 +38,7 @@ impl SceneSummary {
         Some(Self {
             parameters: parameters(&scene),
             collider_meshes: scene.collider_meshes(),
+            shapes: scene.shapes().take(SHAPES_MAX).map(shape_text).collect(),
             name: scene.name,
             unit: scene.unit,
             up: scene.up,
@@ -51,7 +59,16 @@ impl Default for SceneSummary {
             rate_hz: 0,
             parameters: ParameterValues::default(),
             collider_meshes: ColliderMeshes::new(),
+            shapes: Vec::new(),
         }
+    }
+}
+
+fn shape_text((shape, particles): (&Shape, Range<u64>)) -> ShapeText {
+    ShapeText {
+        shape: shape.name().to_owned(),
+        first: particles.start,
+        count: particles.end - particles.start,
     }
 }
 
@@ -107,5 +124,28 @@ mod tests {
         let parameters = summary.parameters;
         assert_eq!((parameters.gravity[1], parameters.substeps), (-1.5, 7));
         assert_eq!((parameters.tear_force, parameters.wind_velocity[0]), (Some(20.0), 1.0));
+    }
+
+    #[test]
+    fn the_shapes_of_a_scene_follow_its_explicit_particles() {
+        let text = "
+            version = 1
+            [[particle]]
+            position = [0, 0, 0]
+            [[generate]]
+            shape = 'rope'
+            count = 5
+            from = [0, 1, 0]
+            to = [1, 1, 0]
+            [[generate]]
+            shape = 'bridge'
+            from = [0, 0, 0]
+            to = [3, 0, 0]
+            planks = 4
+            width = 1";
+        let shapes = SceneSummary::from_toml(text).unwrap().shapes;
+        let shapes: Vec<_> =
+            shapes.iter().map(|one| (one.shape.as_str(), one.first, one.count)).collect();
+        assert_eq!(shapes, [("rope", 1, 5), ("bridge", 6, 8)]);
     }
 }

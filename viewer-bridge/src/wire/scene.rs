@@ -55,6 +55,19 @@ pub struct SceneText {
     pub up: String,
     /// Number of the run, 16 hexadecimal digits.
     pub run_id: String,
+    /// The generated shapes.
+    pub shapes: Vec<ShapeText>,
+}
+
+/// A generated shape of a scene, in its JSON.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ShapeText {
+    /// Name of the shape in scene files.
+    pub shape: String,
+    /// Index of its first particle.
+    pub first: u64,
+    /// Number of its particles.
+    pub count: u64,
 }
 
 impl Scene {

@@ -45,7 +45,7 @@ function rendererOf(simulation) {
 const scene = (epoch) => ({
   kind: "scene", epoch, step: 0, particleCount: 3, constraintCount: 3, triangleCount: 1, isPlanar: false, up: "y",
   positions: Float32Array.of(0, 0, 0, 1, 0, 0, 0, 1, 0), ends: Uint32Array.of(0, 1, 1, 2, 2, 0), restLengths: Float32Array.of(1, 1, 1),
-  triangles: Uint32Array.of(0, 1, 2), constraintKinds: new Uint8Array(3), min: [0, 0, 0], max: [1, 1, 0], name: "one",
+  triangles: Uint32Array.of(0, 1, 2), constraintKinds: new Uint8Array(3), min: [0, 0, 0], max: [1, 1, 0], name: "one", shapes: [],
   meshes: new Map([[1, { vertices: Float32Array.of(0, 0, 0, 1, 0, 0, 0, 0, 1), triangles: Uint32Array.of(0, 1, 2, 2, 1, 0) }]]),
 });
 
@@ -64,8 +64,8 @@ test("scenes of alternating formats use no more memory than the first two", () =
     renderer.upload();
     kept.push({ ...gl.live, bytes: gl.bufferBytes() });
   }
-  assert.equal(kept[0].Texture, 4);
-  assert.equal(kept[1].Texture, 4);
+  assert.equal(kept[0].Texture, 5);
+  assert.equal(kept[1].Texture, 5);
   assert.equal(kept[1].bytes, kept[0].bytes, "the lists of the old scene are freed");
   assert.deepEqual(kept.slice(2), [kept[1], kept[1], kept[1], kept[1]]);
 });
@@ -86,6 +86,26 @@ test("a mesh is drawn at the pose of its collider, each triangle with its normal
   const corners = facets(simulation.scene.meshes.get(1));
   assert.deepEqual([...corners.subarray(3, 6)].map(Math.abs), [0, 1, 0]);
   assert.equal(corners[4], -corners[4 + 3 * 7], "the second triangle faces the other way");
+});
+
+test("a device that cannot compile the effects draws without them", () => {
+  const simulation = new Simulation();
+  const { renderer, gl } = rendererOf(simulation);
+  let source = "";
+  gl.shaderSource = (_, text) => { source += text; };
+  gl.linkProgram = () => {
+    const isLinked = !source.includes("u_shadow_map");
+    gl.getProgramParameter = (_, name) => (name === "ACTIVE_UNIFORMS" ? 0 : isLinked);
+    source = "";
+  };
+  gl.isContextLost = () => false;
+  gl.getAttachedShaders = () => [];
+  simulation.receive(scene(1));
+  simulation.receive(frame(1, 1, false));
+  assert.equal(renderer.toggles.effects, true);
+  renderer.uploadOrSimplify();
+  assert.equal(renderer.toggles.effects, false);
+  assert.equal(renderer.buffers.flatPlaces, null);
 });
 
 test("a scene of another bridge with the same epoch is uploaded", () => {

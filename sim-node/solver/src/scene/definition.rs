@@ -11,10 +11,12 @@ pub(crate) mod settings;
 pub(crate) mod softness;
 pub(crate) mod wind;
 
+use std::ops::Range;
+
 use serde::Serialize;
 use sim_types::STEP_WORK_MAX;
 
-use super::generate::Generator;
+use super::generate::{Generator, Shape};
 use super::model::{Model, Positions};
 use crate::checks::StepSize;
 use anchor::SceneAnchor;
@@ -144,6 +146,16 @@ impl Scene {
     pub fn collider_meshes(&self) -> ColliderMeshes {
         let colliders = self.colliders.iter().enumerate();
         colliders.filter_map(|(index, one)| Some((index, one.mesh.clone()?))).collect()
+    }
+
+    /// Returns the generated shapes with their particles, in the order of the file.
+    pub fn shapes(&self) -> impl Iterator<Item = (&Shape, Range<u64>)> {
+        let mut end = self.particles.len() as u64;
+        self.generators.iter().map(move |generator| {
+            let first = end;
+            end += generator.shape.particle_count();
+            (&generator.shape, first..end)
+        })
     }
 
     /// Counts particles, constraints and pinned particles, including the generated ones.

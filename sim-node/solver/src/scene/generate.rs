@@ -77,6 +77,19 @@ pub enum Shape {
 }
 
 impl Shape {
+    /// Name in scene files.
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::Cloth(_) => "cloth",
+            Self::Mesh(_) => "mesh",
+            Self::Rope(_) => "rope",
+            Self::Web(_) => "web",
+            Self::Bridge(_) => "bridge",
+            Self::Ragdoll(_) => "ragdoll",
+            Self::Obj(_) => "obj",
+        }
+    }
+
     /// Returns the number of particles that the shape expands to, without expanding it.
     pub(crate) fn particle_count(&self) -> u64 {
         match self {

@@ -1,6 +1,8 @@
 //! Pictures as pixel colours. Tests look for classes of colours, never for bytes of a file, so that they
 //! pass with other versions of the browser.
 
+use std::collections::BTreeSet;
+
 use serde_json::Value;
 
 use super::distance;
@@ -73,6 +75,22 @@ impl Picture {
     /// Counts the pixels of a class of colours in an area.
     pub(crate) fn count(&self, area: &Area, matches: impl Fn(Color) -> bool) -> usize {
         self.centers(matches).filter(|center| area.contains(*center)).count()
+    }
+
+    /// Returns the brightness of each pixel, 0 to 255.
+    pub(crate) fn brightness(&self) -> Vec<f64> {
+        let mean = |color: &Color| color.iter().map(|one| f64::from(*one)).sum::<f64>() / 3.0;
+        self.colors.iter().map(mean).collect()
+    }
+
+    /// Returns the different colours in an area.
+    pub(crate) fn colors(&self, area: &Area) -> BTreeSet<Color> {
+        let pixels = self.colors.iter().enumerate();
+        let inside = pixels.filter(|(index, _)| {
+            let (row, column) = (index / self.columns, index % self.columns);
+            area.contains([self.corner[0] + column as f64 + 0.5, self.corner[1] + row as f64 + 0.5])
+        });
+        inside.map(|(_, color)| *color).collect()
     }
 
     /// Returns the centroid of the pixels of a class of colours within `radius` of a point.

@@ -1,9 +1,12 @@
 // GPU resources of a scene: positions, triangle fans, and the lists of triangles, sticks and points.
 // Each is uploaded only when it has changed.
 
+import { bodyRadii, bridgeTriangles, planksOf } from "../state/shapes.js";
 import { drawnSticks } from "../state/topology.js";
-import { ArrayTexture, layouts } from "./context.js";
+import { layFlat } from "../state/weave.js";
+import { ArrayTexture, UNITS, layouts } from "./context.js";
 import { Cloth } from "./cloth.js";
+import { Planks } from "./planks.js";
 import { POINT, Points } from "./points.js";
 import { Sticks } from "./sticks.js";
 import { PIN } from "../net/wire.js";
@@ -18,20 +21,30 @@ export const PARTICLES_MAX = 60_000;
 
 const EMPTY = new Uint32Array(0);
 
-/** Everything that is drawn from particle positions, for one format of positions. */
+/** Everything that is drawn from particle positions, for one variant of the shaders. */
 export class Drawables {
-  /** @param {WebGL2RenderingContext} gl @param {boolean} isQuantised */
-  constructor(gl, isQuantised) {
-    this.isQuantised = isQuantised;
-    this.cloth = new Cloth(gl, isQuantised);
-    this.sticks = new Sticks(gl, isQuantised);
-    this.points = new Points(gl, isQuantised);
+  /** @param {WebGL2RenderingContext} gl @param {import("./context.js").Variant} variant */
+  constructor(gl, variant) {
+    this.gl = gl;
+    this.variant = variant;
+    this.cloth = new Cloth(gl, variant);
+    this.sticks = new Sticks(gl, variant);
+    this.points = new Points(gl, variant.isQuantised);
+    /** Created for the first scene that has any. @type {Planks | null} */
+    this.planks = null;
+  }
+
+  /** @param {import("../state/shapes.js").Plank[]} planks @param {Uint8Array} styles of all constraints */
+  setPlanks(planks, styles) {
+    if (planks.length > 0) this.planks ??= new Planks(this.gl, this.variant);
+    this.planks?.set(planks, styles);
   }
 
   /** Empties all lists, and frees their memory. */
   clear() {
     this.cloth.setTriangles(EMPTY, EMPTY);
     this.sticks.clear();
+    this.setPlanks([], new Uint8Array(0));
     for (const list of [this.points.particles, this.points.marks, this.points.grabbed]) list.set(EMPTY);
   }
 }
@@ -51,16 +64,30 @@ export class SceneBuffers {
     /** Typical distance between neighbours: the median of the rest lengths. */
     this.spacing = medianLength(scene.restLengths, simulation.radius() * 0.5);
     const formats = layouts(gl);
-    this.positions = new ArrayTexture(gl, 0, drawables.isQuantised ? formats.u16x3 : formats.f32x3, scene.particleCount);
-    this.fanRanges = new ArrayTexture(gl, 1, formats.u32x2, scene.particleCount);
-    this.fans = new ArrayTexture(gl, 2, formats.u32x4, scene.triangles.length);
+    this.positions = new ArrayTexture(gl, UNITS.u_positions, drawables.variant.isQuantised ? formats.u16x3 : formats.f32x3, scene.particleCount);
+    this.fanRanges = new ArrayTexture(gl, UNITS.u_fan_ranges, formats.u32x2, scene.particleCount);
+    this.fans = new ArrayTexture(gl, UNITS.u_fans, formats.u32x4, scene.triangles.length);
     /** Vertices of the pieces of split triangles; see SPLIT_WORDS. @type {ArrayTexture} */
-    this.splits = new ArrayTexture(gl, 3, formats.u32x4, 0);
+    this.splits = new ArrayTexture(gl, UNITS.u_splits, formats.u32x4, 0);
     if (scene.particleCount > 0) this.fanRanges.write(topology.fanRanges);
-    drawables.sticks.setSticks(scene, drawnSticks(scene, STICKS_MAX), topology.styles);
+    const { hasEffects } = drawables.variant;
+    this.planks = hasEffects ? planksOf(scene) : [];
+    /** Triangles in place of which planks are drawn; null without any. */
+    this.hidden = this.planks.length > 0 ? bridgeTriangles(scene) : null;
+    /** Places of the particles in the surface laid flat. @type {ArrayTexture | null} */
+    this.flatPlaces = hasEffects ? new ArrayTexture(gl, UNITS.u_flat_places, formats.f32x2, scene.particleCount) : null;
+    if (scene.particleCount > 0) this.flatPlaces?.write(layFlat(topology));
+    drawables.sticks.setSticks(scene, drawnSticks(scene, STICKS_MAX), topology.styles, hasEffects ? this.radii() : new Float32Array(scene.constraintCount));
     this.writeTopology(true);
     this.writeParticles();
     this.writeMarks();
+  }
+
+  /** The radii of ropes and limbs. */
+  radii() {
+    const { parameters } = this.simulation;
+    const contact = parameters?.initial?.contact ?? null;
+    return bodyRadii(this.scene, { contact: typeof contact === "number" ? contact : null, sceneRadius: this.simulation.radius() });
   }
 
   /** @param {Frame} frame */
@@ -70,15 +97,16 @@ export class SceneBuffers {
 
   /** Uploads the intact triangles and sticks, and the changed fan entries. @param {boolean} [isAll] */
   writeTopology(isAll = false) {
-    const { topology, drawables, fans } = this;
+    const { topology, drawables, fans, hidden } = this;
     const { first, end } = isAll ? { first: 0, end: fans.count } : topology.dirtyFans.range();
     if (end > first) fans.write(topology.fans, first, end);
     topology.dirtyFans.clear();
-    const { vertices, indices } = topology.pieces();
+    const { vertices, indices } = topology.pieces((triangle) => hidden === null || hidden[triangle] === 0);
     this.splits.delete();
-    this.splits = new ArrayTexture(this.gl, 3, layouts(this.gl).u32x4, vertices.length / 4);
+    this.splits = new ArrayTexture(this.gl, UNITS.u_splits, layouts(this.gl).u32x4, vertices.length / 4);
     this.splits.write(vertices);
-    drawables.cloth.setTriangles(topology.indices, indices);
+    drawables.cloth.setTriangles(hidden === null ? topology.indices : topology.indices.map((particle, corner) => (hidden[Math.floor(corner / 3)] ? 0 : particle)), indices);
+    drawables.setPlanks(this.planks, topology.styles);
     if (!isAll) drawables.sticks.setStyles(topology.styles);
   }
 
@@ -103,7 +131,7 @@ export class SceneBuffers {
   }
 
   delete() {
-    for (const texture of [this.positions, this.fanRanges, this.fans, this.splits]) texture.delete();
+    for (const texture of [this.positions, this.fanRanges, this.fans, this.splits, this.flatPlaces]) texture?.delete();
     this.drawables.clear();
   }
 }

@@ -1,8 +1,8 @@
 // The surface: two-sided cloth. The vertex shader computes the normal of a particle from the intact
 // triangles around it, so after a tear the CPU only lists the triangles that are gone.
 
-import { Program } from "./context.js";
-import { HEADER, HEAT, LIGHT, SCREEN, SHADOW, positionReader } from "./shaders.js";
+import { Program, UNITS } from "./context.js";
+import { BLUR, HEADER, HEAT, LIGHT, SCREEN, SHADOW, positionReader, sunlight } from "./shaders.js";
 
 /** Defines surface_position(vertex, particle): a vertex is a particle, or moves with one (state/splits.js). */
 const SURFACE_POSITION = `
@@ -20,6 +20,54 @@ vec3 surface_position(uint vertex, out uint particle) {
   return at + weights.x * (position(corners.y) - at) + weights.y * (position(corners.z) - at);
 }
 `;
+
+/** Defines flat_place(vertex): the place of a vertex in the surface laid flat (state/weave.js). */
+const FLAT_PLACE = `
+uniform highp sampler2D u_flat_places;
+vec2 flat_place_of(uint particle) { return texelFetch(u_flat_places, texel(particle), 0).xy; }
+vec2 flat_place(uint vertex) {
+  uint count = uint(u_particle_count);
+  if (vertex < count) return flat_place_of(vertex);
+  uint first = 2u * (vertex - count);
+  uvec4 corners = texelFetch(u_splits, texel(first), 0);
+  vec2 weights = uintBitsToFloat(texelFetch(u_splits, texel(first + 1u), 0).xy);
+  vec2 at = flat_place_of(corners.x);
+  return at + weights.x * (flat_place_of(corners.y) - at) + weights.y * (flat_place_of(corners.z) - at);
+}
+`;
+const NO_FLAT_PLACE = "vec2 flat_place(uint vertex) { return vec2(0.0); }\n";
+
+/**
+ * Defines weave(place, position): the brightness of the threads, around 1. A thread that lies on top is bright
+ * in its middle. The threads fade out before they are finer than the pixels, and broader stripes remain; both
+ * fade where the surface could not be laid flat.
+ */
+const WEAVE = `
+uniform float u_thread;
+float fading(vec2 cell) {
+  vec2 width = fwidth(cell);
+  return 1.0 - smoothstep(0.25, 0.6, max(width.x, width.y));
+}
+float weave(vec2 place, vec3 at) {
+  vec4 flat_rate = vec4(dFdx(place), dFdy(place));
+  float rate = dot(dFdx(at), dFdx(at)) + dot(dFdy(at), dFdy(at));
+  float stretch = dot(flat_rate, flat_rate) / max(rate, 1e-20);
+  float faith = smoothstep(0.3, 0.6, stretch) * (1.0 - smoothstep(1.7, 3.0, stretch));
+  vec2 cell = place / u_thread;
+  vec2 id = floor(cell);
+  vec2 inside = fract(cell) - 0.5;
+  bool is_weft = mod(id.x + id.y, 2.0) < 0.5;
+  float across = is_weft ? inside.y : inside.x;
+  float along = is_weft ? inside.x : inside.y;
+  float height = cos(across * 3.1416) * (0.65 + 0.35 * cos(along * 3.1416));
+  float threads = (height - 0.56) * 0.42 * fading(cell);
+  vec2 stripe = place / (u_thread * 16.0);
+  vec2 ridge = abs(fract(stripe) - 0.5);
+  float stripes = (smoothstep(0.44, 0.47, ridge.x) + smoothstep(0.44, 0.47, ridge.y)) * -0.14 * fading(stripe * 4.0);
+  return 1.0 + faith * (threads + stripes);
+}
+`;
+const NO_WEAVE = "float weave(vec2 place, vec3 at) { return 1.0; }\n";
 
 const NORMAL_FROM_FAN = `
 uniform usampler2D u_fan_ranges;
@@ -42,22 +90,26 @@ void main() {
   v_position = surface;
   v_normal = normal;
   v_strain = strain / max(edges, 1.0);
+  v_flat_place = flat_place(uint(gl_VertexID));
   gl_Position = u_view_projection * vec4(surface, 1.0);
 }
 `;
 
-/** @param {boolean} isQuantised */
-const vertex = (isQuantised) => `${HEADER}
+/** @param {import("./context.js").Variant} variant */
+const vertex = ({ isQuantised, hasEffects }) => `${HEADER}
 uniform mat4 u_view_projection;
 out vec3 v_position;
 out vec3 v_normal;
 out float v_strain;
-${positionReader(isQuantised)}${SURFACE_POSITION}${NORMAL_FROM_FAN}`;
+out vec2 v_flat_place;
+${positionReader(isQuantised)}${SURFACE_POSITION}${hasEffects ? FLAT_PLACE : NO_FLAT_PLACE}${NORMAL_FROM_FAN}`;
 
-const FRAGMENT = `${HEADER}${SCREEN}${LIGHT}${HEAT}
+/** @param {import("./context.js").Variant} variant */
+const fragment = ({ hasEffects }) => `${HEADER}${SCREEN}${LIGHT}${HEAT}${sunlight(hasEffects)}${hasEffects ? WEAVE : NO_WEAVE}
 in vec3 v_position;
 in vec3 v_normal;
 in float v_strain;
+in vec2 v_flat_place;
 uniform vec3 u_eye;
 uniform vec3 u_front;
 uniform vec3 u_back;
@@ -73,8 +125,9 @@ void main() {
   normal = gl_FrontFacing ? normal : -normal;
   vec3 to_eye = normalize(u_eye - v_position);
   bool is_heat = u_heat_max > 0.0;
+  base *= weave(v_flat_place, v_position);
   if (is_heat) base = heat(v_strain);
-  vec3 color = lit(base, v_position, normal, to_eye, is_heat ? 0.2 : 1.0);
+  vec3 color = lit(base, v_position, normal, to_eye, is_heat ? 0.2 : 1.0, sunlight(v_position, normal, ${BLUR.scene}));
   // Shading would distort the colours of the heat map, so about half of it is unshaded.
   o_color = screen(is_heat ? mix(base, color, 0.45) : color, 1.0);
 }
@@ -102,12 +155,12 @@ void main() {
 `;
 
 export class Cloth {
-  /** @param {WebGL2RenderingContext} gl @param {boolean} isQuantised */
-  constructor(gl, isQuantised) {
+  /** @param {WebGL2RenderingContext} gl @param {import("./context.js").Variant} variant */
+  constructor(gl, variant) {
     this.gl = gl;
-    this.program = new Program(gl, vertex(isQuantised), FRAGMENT);
-    this.shadow = new Program(gl, shadowVertex(isQuantised), SHADOW_FRAGMENT);
-    for (const program of [this.program, this.shadow]) program.setSamplers({ u_positions: 0, u_fan_ranges: 1, u_fans: 2, u_splits: 3 });
+    this.program = new Program(gl, vertex(variant), fragment(variant));
+    this.shadow = new Program(gl, shadowVertex(variant.isQuantised), SHADOW_FRAGMENT);
+    for (const program of [this.program, this.shadow]) program.setSamplers(UNITS);
     this.vao = gl.createVertexArray();
     this.indices = gl.createBuffer();
     this.count = 0;

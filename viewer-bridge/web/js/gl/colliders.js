@@ -1,8 +1,8 @@
 // Colliders: solids in 3-D, filled shapes in 2-D.
 
 import { add, addScaled, frameOf, length, normalize, rotate, scale, subtract, tangents } from "../geometry/math.js";
-import { Program } from "./context.js";
-import { HEADER, LIGHT, SCREEN, SHADOW } from "./shaders.js";
+import { Program, UNITS } from "./context.js";
+import { BLUR, HEADER, LIGHT, SCREEN, SHADOW, sunlight } from "./shaders.js";
 import { VERTEX_FLOATS, ball, cube, cubeEdges, facets } from "./solids.js";
 
 /** @typedef {import("../geometry/math.js").Vec3} Vec3 */
@@ -37,7 +37,7 @@ void main() {
 }
 `;
 
-const FRAGMENT = `${HEADER}${SHADOW}${SCREEN}${LIGHT}
+const fragment = (/** @type {boolean} */ hasEffects) => `${HEADER}${SHADOW}${SCREEN}${LIGHT}${sunlight(hasEffects)}
 in vec3 v_position;
 in vec3 v_normal;
 in float v_height;
@@ -54,7 +54,7 @@ void main() {
     vec3 to_eye = normalize(u_eye - v_position);
     // A mesh has two sides.
     vec3 normal = normalize(v_normal) * (dot(v_normal, to_eye) < 0.0 ? -1.0 : 1.0);
-    o_color = screen(lit(u_collider, v_position, normal, to_eye, 0.3), 1.0);
+    o_color = screen(lit(u_collider, v_position, normal, to_eye, 0.3, sunlight(v_position, normal, ${BLUR.scene})), 1.0);
   }
 }
 `;
@@ -73,7 +73,7 @@ function placeBox(center, half, rotation) {
 }
 
 /** @param {Vec3} a @param {Vec3} b @param {number} radius @returns {Placed} */
-function placeCapsule(a, b, radius) {
+export function placeCapsule(a, b, radius) {
   const axis = length(subtract(b, a)) > 0 ? normalize(subtract(b, a)) : /** @type {Vec3} */ ([0, 1, 0]);
   const [u, v] = tangents(axis);
   return { solid: "ball", a, b, shape: frameOf(scale(u, radius), scale(axis, radius), scale(v, radius), ORIGIN), turn: frameOf(u, axis, v, ORIGIN) };
@@ -104,10 +104,11 @@ export function placeCollider(one, isPlanar, near, radius) {
 }
 
 export class Colliders {
-  /** @param {WebGL2RenderingContext} gl */
-  constructor(gl) {
+  /** @param {WebGL2RenderingContext} gl @param {boolean} hasEffects */
+  constructor(gl, hasEffects) {
     this.gl = gl;
-    this.program = new Program(gl, VERTEX, FRAGMENT);
+    this.program = new Program(gl, VERTEX, fragment(hasEffects));
+    this.program.setSamplers(UNITS);
     const [aBall, aCube] = [ball(), cube()];
     this.solids = {
       ball: this.load(aBall.vertices, aBall.indices),
@@ -120,6 +121,8 @@ export class Colliders {
     this.loadedMeshes = new Map();
     /** @type {Placed[]} */
     this.placed = [];
+    /** The poles of flags. @type {Placed[]} */
+    this.poles = [];
   }
 
   /** Replaces the meshes by those of a scene. @param {Map<number, import("../net/wire.js").ColliderMesh>} meshes */
@@ -156,11 +159,17 @@ export class Colliders {
 
   /** @param {Uniforms} uniforms */
   draw(uniforms) {
-    if (this.placed.length === 0) return;
+    this.drawAll(this.placed, uniforms);
+    if (this.poles.length > 0) this.drawAll(this.poles, { ...uniforms, u_collider: uniforms.u_pole });
+  }
+
+  /** @param {Placed[]} bodies @param {Uniforms} uniforms */
+  drawAll(bodies, uniforms) {
+    if (bodies.length === 0) return;
     const { gl } = this;
     this.program.use();
     this.program.set(uniforms);
-    for (const { solid, shape, turn, a, b } of this.placed) {
+    for (const { solid, shape, turn, a, b } of bodies) {
       const isEdges = solid === "edges";
       const loaded = typeof solid === "number" ? this.loadedMeshes.get(solid) : this.solids[solid];
       if (loaded === undefined) continue;

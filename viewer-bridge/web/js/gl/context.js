@@ -5,6 +5,9 @@
 /** Texels per row of an array texture; every WebGL2 device supports this width. */
 export const ROW = 1024;
 
+/** Texture units by the samplers of the shaders. */
+export const UNITS = Object.freeze({ u_positions: 0, u_fan_ranges: 1, u_fans: 2, u_splits: 3, u_flat_places: 4, u_shadow_map: 5 });
+
 /**
  * Opens the WebGL2 context of a canvas; null if the browser has no WebGL2. The canvas is opaque, because
  * the ground must fade into the backdrop, not into the page.
@@ -18,6 +21,12 @@ export function rendererName(gl) {
   const extension = gl.getExtension("WEBGL_debug_renderer_info");
   return String(gl.getParameter(extension ? extension.UNMASKED_RENDERER_WEBGL : gl.RENDERER));
 }
+
+/** Variant of the shaders: they read quantised positions, and draw shadows, weave and solid bodies.
+ * @typedef {{ isQuantised: boolean, hasEffects: boolean }} Variant */
+
+/** True for a renderer without a graphics processor, for which effects are too slow. @param {string} name */
+export const isSoftware = (name) => /swiftshader|llvmpipe|lavapipe|softpipe|software|basic render/i.test(name);
 
 /** A linked program, with the locations of its uniforms. */
 export class Program {
@@ -86,10 +95,11 @@ function link(gl, vertex, fragment) {
 /** Storage of the texels of a texture: internal format, format, type, and components per texel.
  * @typedef {{ internal: number, format: number, type: number, width: number }} Layout */
 
-/** @param {GL} gl @returns {Record<"u16x3" | "f32x3" | "u32x2" | "u32x4", Layout>} */
+/** @param {GL} gl @returns {Record<"u16x3" | "f32x3" | "f32x2" | "u32x2" | "u32x4", Layout>} */
 export const layouts = (gl) => ({
   u16x3: { internal: gl.RGB16UI, format: gl.RGB_INTEGER, type: gl.UNSIGNED_SHORT, width: 3 },
   f32x3: { internal: gl.RGB32F, format: gl.RGB, type: gl.FLOAT, width: 3 },
+  f32x2: { internal: gl.RG32F, format: gl.RG, type: gl.FLOAT, width: 2 },
   u32x2: { internal: gl.RG32UI, format: gl.RG_INTEGER, type: gl.UNSIGNED_INT, width: 2 },
   u32x4: { internal: gl.RGBA32UI, format: gl.RGBA_INTEGER, type: gl.UNSIGNED_INT, width: 4 },
 });

@@ -1,8 +1,8 @@
 // The background: a soft backdrop, and a ground. The lines of the ground are computed per pixel, so
 // they neither flicker at the horizon nor end at an edge.
 
-import { Program } from "./context.js";
-import { CORNER, HEADER, SCREEN } from "./shaders.js";
+import { Program, UNITS } from "./context.js";
+import { BLUR, CORNER, HEADER, SCREEN, sunlight } from "./shaders.js";
 
 const BACKDROP_VERTEX = `${HEADER}${CORNER}
 out vec2 v_at;
@@ -28,16 +28,21 @@ uniform vec3 u_along;
 uniform vec3 u_across;
 uniform float u_size;
 out vec2 v_at;
+out vec3 v_position;
 void main() {
   v_at = corner() * u_size;
   vec3 at = u_middle + u_along * v_at.x + u_across * v_at.y;
+  v_position = at;
   gl_Position = u_view_projection * vec4(at, 1.0);
 }
 `;
 
 /** Grid lines at two spacings, a factor of ten apart. The finer ones fade out before they merge. */
-const GROUND_FRAGMENT = `${HEADER}${SCREEN}
+const groundFragment = (/** @type {boolean} */ hasEffects) => `${HEADER}${SCREEN}${sunlight(hasEffects)}
 in vec2 v_at;
+in vec3 v_position;
+uniform vec3 u_normal;
+uniform float u_shadow;
 uniform vec2 u_shift;
 uniform vec3 u_fill;
 uniform vec3 u_line;
@@ -56,15 +61,17 @@ void main() {
   float fade = 1.0 - smoothstep(0.08, 1.0, length(v_at) / u_size);
   float line = u_contrast * max(lines(u_spacing * 10.0), lines(u_spacing) * 0.5);
   o_color = screen(mix(u_fill, u_line, line), fade * fade);
+  o_color.rgb *= 1.0 - u_shadow * (1.0 - sunlight(v_position, u_normal, ${BLUR.ground}));
 }
 `;
 
 export class Ground {
-  /** @param {WebGL2RenderingContext} gl */
-  constructor(gl) {
+  /** @param {WebGL2RenderingContext} gl @param {boolean} hasEffects */
+  constructor(gl, hasEffects) {
     this.gl = gl;
     this.backdrop = new Program(gl, BACKDROP_VERTEX, BACKDROP_FRAGMENT);
-    this.program = new Program(gl, GROUND_VERTEX, GROUND_FRAGMENT);
+    this.program = new Program(gl, GROUND_VERTEX, groundFragment(hasEffects));
+    this.program.setSamplers(UNITS);
     this.vao = gl.createVertexArray();
   }
 

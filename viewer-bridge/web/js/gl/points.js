@@ -1,6 +1,6 @@
 // Particles as small balls; marks of pinned, anchored, grabbed and frozen particles as discs with a white ring.
 
-import { Program } from "./context.js";
+import { Program, UNITS } from "./context.js";
 import { HEADER, SCREEN, SHADOW, positionReader } from "./shaders.js";
 
 /** Styles of a point, as the shader numbers them. */
@@ -70,7 +70,7 @@ export class Points {
   constructor(gl, isQuantised) {
     this.gl = gl;
     this.program = new Program(gl, vertex(isQuantised), FRAGMENT);
-    this.program.setSamplers({ u_positions: 0 });
+    this.program.setSamplers(UNITS);
     this.particles = new PointList(gl);
     this.marks = new PointList(gl);
     this.grabbed = new PointList(gl);

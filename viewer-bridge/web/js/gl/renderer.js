@@ -1,20 +1,23 @@
 // Draws the picture, layer by layer. Uploads only what has changed since the last picture, and draws
 // only if something has.
 
-import { add, addScaled, dot, multiply, normalize, scale, shadowOnto, tangents } from "../geometry/math.js";
+import { add, addScaled, dot, multiply, normalize, scale, scaleThenMove, shadowOnto, tangents } from "../geometry/math.js";
 import { HEAT_STOPS, linear, paletteOf } from "./theme.js";
-import { openContext, rendererName } from "./context.js";
+import { isSoftware, openContext, rendererName } from "./context.js";
 import { Arrows } from "./arrows.js";
 import { Drawables, SceneBuffers } from "./buffers.js";
-import { Colliders, placeCollider } from "./colliders.js";
+import { Colliders, placeCapsule, placeCollider } from "./colliders.js";
 import { Ground } from "./ground.js";
+import { MAP_SIZE, ShadowMap, clipBox, lightView } from "./shadow-map.js";
 import { ForceScale, arrowsOf } from "../state/forces.js";
+import { includeSolids } from "../state/framing.js";
+import { polesOf } from "../state/shapes.js";
 
 /** @typedef {import("../geometry/math.js").Vec3} Vec3 */
 /** @typedef {import("../state/simulation.js").Simulation} Simulation */
 /** @typedef {import("../geometry/camera.js").Camera} Camera */
 /** @typedef {Record<string, number | number[]>} Uniforms */
-/** @typedef {{ surface: boolean, sticks: boolean, particles: boolean, pins: boolean, heat: boolean, shadow: boolean, forces: boolean }} Toggles */
+/** @typedef {{ surface: boolean, sticks: boolean, particles: boolean, pins: boolean, heat: boolean, shadow: boolean, forces: boolean, effects: boolean }} Toggles */
 
 /** Limit on device pixels per CSS pixel: the cost grows with the square, and a finer picture looks the same. */
 const PIXEL_RATIO_MAX = 2;
@@ -25,13 +28,22 @@ const LAMP_RADII = 2.6;
 const GROUND_RADII = 6;
 /** Width of the shaft of a force arrow, in CSS pixels. */
 const ARROW_WIDTH = 3;
+/** Width of a thread of the weave, in distances between particles. */
+const THREAD_SPACINGS = 0.25;
+/** Reach of shadows around the target of the camera, in distances from it: a little more than the picture shows. */
+const SHADOW_REACH = 1.2;
 /** Scenes with more particles than a ragdoll are drawn with thinner sticks. */
 const FEW_PARTICLES = 60;
+
+/** A matrix that takes every point out of the shadow map, where everything is lit. */
+const NOWHERE = scaleThenMove([-9, -9, 0], [0, 0, 0]);
 
 export class Renderer {
   /** @param {HTMLCanvasElement} canvas @param {Simulation} simulation @param {Camera} camera @param {boolean} antialias */
   constructor(canvas, simulation, camera, antialias) {
     this.canvas = canvas;
+    /** @type {Colliders | undefined} */
+    this.colliders = undefined;
     this.simulation = simulation;
     this.camera = camera;
     const gl = openContext(canvas, antialias);
@@ -42,7 +54,7 @@ export class Renderer {
     this.viewport = { width: 1, height: 1 };
     this.heatMax = 0.05;
     /** @type {Toggles} */
-    this.toggles = { surface: true, sticks: false, particles: false, pins: true, heat: false, shadow: true, forces: false };
+    this.toggles = { surface: true, sticks: false, particles: false, pins: true, heat: false, shadow: true, forces: false, effects: !isSoftware(rendererName(gl)) };
     this.forceScale = new ForceScale();
     /** The drawn forces. @type {import("../state/forces.js").Arrow[]} */
     this.arrowsDrawn = [];
@@ -52,7 +64,7 @@ export class Renderer {
     this.frameDrawn = null;
     this.isDirty = true;
     /** Parts that have changed since they were uploaded. */
-    this.stale = { topology: false, particles: false, marks: false, colliders: true };
+    this.stale = { topology: false, particles: false, marks: false, colliders: true, poles: true };
     this.measure();
     this.create();
     this.listen();
@@ -64,18 +76,37 @@ export class Renderer {
 
   /** Creates every object of the context: at first, and again after the context was lost. */
   create() {
-    this.ground = new Ground(this.gl);
-    this.colliders = new Colliders(this.gl);
+    /** By whether there are effects. @type {Map<boolean, { ground: Ground, colliders: Colliders }>} */
+    this.surroundings = new Map();
+    this.chooseSurroundings(false);
     this.arrows = new Arrows(this.gl);
-    /** By whether they read quantised positions. Kept for both formats, because compiling is slow. @type {Map<boolean, Drawables>} */
-    this.drawablesByFormat = new Map();
+    /** Created for the first picture with effects. @type {ShadowMap | null} */
+    this.shadowMap = null;
+    /** Where the light looks at in the present picture; null without effects, or without anything near. @type {import("./shadow-map.js").LightView | null} */
+    this.lightView = null;
+    /** By variant. All are kept, because compiling is slow. @type {Map<string, Drawables>} */
+    this.drawablesByVariant = new Map();
     /** Those for the format of the frame. @type {Drawables | null} */
     this.drawables = null;
     /** @type {SceneBuffers | null} */
     this.buffers = null;
     this.frameDrawn = null;
-    this.stale.colliders = true;
     this.isDirty = true;
+  }
+
+  /** Shadows, weave and solid bodies are drawn: in 3-D, unless they are turned off. */
+  hasEffects() {
+    return this.toggles.effects && this.simulation.scene !== null && !this.simulation.scene.isPlanar;
+  }
+
+  /** Makes the ground and the colliders those with or without effects. @param {boolean} hasEffects */
+  chooseSurroundings(hasEffects) {
+    const chosen = this.surroundings?.get(hasEffects) ?? { ground: new Ground(this.gl, hasEffects), colliders: new Colliders(this.gl, hasEffects) };
+    this.surroundings?.set(hasEffects, chosen);
+    /** @type {Ground | undefined} */
+    this.ground = chosen.ground;
+    if (this.colliders !== chosen.colliders) this.stale.colliders = this.stale.poles = true;
+    this.colliders = chosen.colliders;
   }
 
   listen() {
@@ -86,9 +117,9 @@ export class Renderer {
     });
     simulation.on("frame", () => this.invalidate({}));
     simulation.on("tear", () => this.invalidate({ topology: true, particles: true }));
-    simulation.on("pins", () => this.invalidate({ marks: true }));
+    simulation.on("pins", () => this.invalidate({ marks: true, poles: true }));
     simulation.on("colliders", () => this.invalidate({ colliders: true }));
-    simulation.on("ground", () => this.invalidate({}));
+    simulation.on("ground", () => this.invalidate({ poles: true }));
   }
 
   /** @param {Partial<Renderer["stale"]>} what */
@@ -120,8 +151,9 @@ export class Renderer {
     const { gl } = this;
     if (gl.isContextLost()) return;
     this.resize();
-    this.upload();
+    this.uploadOrSimplify();
     const uniforms = this.uniforms();
+    if (this.lightView !== null) this.drawShadowMap(uniforms, this.lightView);
     gl.viewport(0, 0, this.canvas.width, this.canvas.height);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT | gl.STENCIL_BUFFER_BIT);
     gl.enable(gl.BLEND);
@@ -134,6 +166,17 @@ export class Renderer {
     this.isDirty = false;
   }
 
+  /** Uploads whatever has changed. A device that cannot compile the effects draws without them. */
+  uploadOrSimplify() {
+    try {
+      this.upload();
+    } catch (error) {
+      if (!this.hasEffects()) throw error;
+      this.toggles.effects = false;
+      this.upload();
+    }
+  }
+
   /** Uploads whatever has changed. */
   upload() {
     const { simulation, stale } = this;
@@ -143,29 +186,32 @@ export class Renderer {
       this.buffers = null;
       return;
     }
-    const drawables = this.drawablesFor(frame.isQuantised);
+    this.chooseSurroundings(this.hasEffects());
+    const drawables = this.drawablesFor({ isQuantised: frame.isQuantised, hasEffects: this.hasEffects() });
     this.drawables = drawables;
     if (this.buffers === null || this.buffers.scene !== scene || this.buffers.drawables !== drawables) {
       this.buffers?.delete();
       this.buffers = new SceneBuffers(this.gl, simulation, drawables);
       this.frameDrawn = null;
       stale.topology = stale.particles = stale.marks = false;
-      stale.colliders = true;
+      stale.colliders = stale.poles = true;
     }
     if (stale.topology) this.buffers.writeTopology();
     if (stale.particles) this.buffers.writeParticles();
     if (stale.marks) this.buffers.writeMarks();
     if (frame !== this.frameDrawn) this.buffers.writePositions(frame);
     if (stale.colliders) this.placeColliders(scene.isPlanar);
+    if (stale.poles) this.placePoles();
     this.frameDrawn = frame;
     this.stepDrawn = frame.step;
-    this.stale = { topology: false, particles: false, marks: false, colliders: false };
+    this.stale = { topology: false, particles: false, marks: false, colliders: false, poles: false };
   }
 
-  /** @param {boolean} isQuantised */
-  drawablesFor(isQuantised) {
-    const drawables = this.drawablesByFormat.get(isQuantised) ?? new Drawables(this.gl, isQuantised);
-    this.drawablesByFormat.set(isQuantised, drawables);
+  /** @param {import("./context.js").Variant} variant */
+  drawablesFor(variant) {
+    const key = JSON.stringify(variant);
+    const drawables = this.drawablesByVariant.get(key) ?? new Drawables(this.gl, variant);
+    this.drawablesByVariant.set(key, drawables);
     return drawables;
   }
 
@@ -175,6 +221,22 @@ export class Renderer {
     if (!colliders) return;
     colliders.loadMeshes(simulation.scene?.meshes ?? new Map());
     colliders.placed = simulation.colliders.flatMap((one) => placeCollider(one, isPlanar, this.camera.target, simulation.radius()));
+  }
+
+  placePoles() {
+    if (!this.colliders) return;
+    this.colliders.poles = this.hasEffects() ? polesOf(this.simulation).map(({ top, foot, radius }) => placeCapsule(foot, top, radius)) : [];
+  }
+
+  /** The view of the light, onto what is near the picture; null without effects. @param {Vec3} light */
+  viewOfLight(light) {
+    const { simulation, camera, toggles } = this;
+    if (!this.hasEffects() || !toggles.shadow || simulation.frame === null) return null;
+    const { min, max } = simulation.frame.bounds;
+    const box = { min: /** @type {Vec3} */ ([...min]), max: /** @type {Vec3} */ ([...max]) };
+    includeSolids(box, simulation);
+    const near = clipBox(box, camera.target, camera.distance * SHADOW_REACH);
+    return near === null ? null : lightView(light, near);
   }
 
   /** The uniforms of all programs. @returns {Uniforms} */
@@ -188,6 +250,8 @@ export class Renderer {
     const isFlat = camera.isFlat;
     const hasSurface = (simulation.scene?.triangleCount ?? 0) > 0;
     const ground = simulation.ground;
+    const basis = camera.basis();
+    this.lightView = this.viewOfLight(light);
     return {
       u_view_projection: multiply(projection, camera.view()),
       u_lo: simulation.frame?.lo ?? [0, 0, 0], u_scale: simulation.frame?.scale ?? [1, 1, 1],
@@ -204,6 +268,9 @@ export class Renderer {
       u_marks: [...palette.pin, ...palette.anchor, ...palette.grabbed, ...palette.frozen],
       u_particle_count: simulation.scene?.particleCount ?? 0, u_round: 1, u_opacity: 1, u_forward: 0, u_shadow: 0, u_is_all: 1,
       u_ground: ground ? [...ground.normal, ground.offset] : [...up, -1e9],
+      u_right: basis.right, u_upward: basis.up, u_is_solid: this.hasEffects() ? 1 : 0,
+      u_thread: (this.buffers?.spacing ?? 1) * THREAD_SPACINGS, u_wood: palette.wood, u_pole: palette.pole, u_body: palette.body,
+      u_to_shadow_map: this.lightView?.map ?? NOWHERE, u_texel: this.lightView?.texel ?? 0,
       ...this.sizes(ratio, hasSurface, isFlat),
     };
   }
@@ -233,7 +300,7 @@ export class Renderer {
     ground?.drawBackdrop({ u_top: palette.backdropTop, u_bottom: palette.backdropBottom });
     if (simulation.ground !== null && !simulation.scene?.isPlanar) {
       this.drawPlane(simulation.ground, uniforms, this.camera.target);
-      if (this.toggles.shadow) this.drawShadows(simulation.ground, uniforms);
+      if (this.toggles.shadow && !this.hasEffects()) this.drawShadows(simulation.ground, uniforms);
     }
     gl.depthMask(true);
   }
@@ -251,6 +318,23 @@ export class Renderer {
     this.ground?.draw({
       u_view_projection: uniforms.u_view_projection, u_middle: middle, u_along: along, u_across: across,
       u_size: size, u_shift: shift, u_fill: palette.ground, u_line: palette.gridLine, u_contrast: palette.gridContrast, u_spacing: spacing,
+      u_normal: plane.normal, u_shadow: palette.shadow, u_to_shadow_map: uniforms.u_to_shadow_map, u_texel: uniforms.u_texel,
+    });
+  }
+
+  /** Draws what casts shadows, as the light sees it. @param {Uniforms} uniforms @param {import("./shadow-map.js").LightView} light */
+  drawShadowMap(uniforms, light) {
+    this.shadowMap ??= new ShadowMap(this.gl);
+    this.gl.disable(this.gl.BLEND);
+    const casting = {
+      ...uniforms, u_shadow: 1, u_view_projection: light.clip, u_viewport: [MAP_SIZE, MAP_SIZE],
+      u_pixels_per_unit: 1 / light.texel, u_near: 0, u_radius_min: 0.7,
+    };
+    this.shadowMap.draw(() => {
+      this.colliders?.draw(casting);
+      if (this.toggles.surface) this.drawables?.cloth.drawShadow(casting);
+      this.drawables?.planks?.draw(casting);
+      this.drawSticks(casting);
     });
   }
 
@@ -290,6 +374,7 @@ export class Renderer {
     }
     if (this.buffers === null || drawables === null) return;
     if (this.toggles.surface) drawables.cloth.draw(uniforms);
+    drawables.planks?.draw(uniforms);
     this.drawSticks({ ...uniforms, u_forward: 4e-4, u_opacity: this.hasSurface() ? 0.75 : 1 });
     this.drawPoints({ ...uniforms, u_forward: 1.2e-3 });
   }

@@ -29,23 +29,24 @@ vec3 heat(float strain) {
 }
 `;
 
-/** Defines lit(base, at, normal, to_eye, sheen): a soft sky, one key light with a wrapped edge, light through thin cloth, a rim. */
+/** Defines lit(base, at, normal, to_eye, sheen, sun): a soft sky, one key light with a wrapped edge, light through thin cloth, a rim.
+ * `sun` is the part of the key light that arrives, 0..=1. */
 export const LIGHT = `
 uniform vec3 u_up;
 uniform vec3 u_lamp;
 uniform vec3 u_sky;
 uniform vec3 u_bounce;
 uniform float u_key;
-vec3 lit(vec3 base, vec3 at, vec3 normal, vec3 to_eye, float sheen) {
+vec3 lit(vec3 base, vec3 at, vec3 normal, vec3 to_eye, float sheen, float sun) {
   vec3 to_light = normalize(u_lamp - at);
   vec3 around = mix(u_bounce, u_sky, 0.5 + 0.5 * dot(normal, u_up));
   float facing = dot(normal, to_light);
   float direct = pow(clamp((facing + 0.25) / 1.25, 0.0, 1.0), 1.6);
   float through = clamp(-facing, 0.0, 1.0) * 0.12 * sheen;
-  vec3 color = base * (around * 0.42 + u_key * (direct * 1.0 + through));
+  vec3 color = base * (around * 0.42 + u_key * sun * (direct + through));
   float gloss = pow(clamp(dot(normal, normalize(to_light + to_eye)), 0.0, 1.0), 28.0);
   float rim = pow(1.0 - clamp(dot(normal, to_eye), 0.0, 1.0), 4.0);
-  return color + sheen * u_key * (gloss * 0.07 + rim * 0.08 * u_sky);
+  return color + sheen * u_key * (gloss * 0.07 * sun + rim * 0.08 * u_sky);
 }
 `;
 
@@ -54,6 +55,41 @@ export const SCREEN = `
 out vec4 o_color;
 vec4 screen(vec3 color, float alpha) { return vec4(pow(clamp(color, 0.0, 1.0), vec3(1.0 / 2.2)), alpha); }
 `;
+
+/** Taps of a soft shadow. */
+const TAPS = 14;
+
+/**
+ * Defines sunlight(at, normal, blur): the part of the key light that arrives at a point, 0..=1, from the shadow map
+ * (shadow-map.js). The edge of a shadow is `blur` wide, in texels. Without effects there is no map, and everything is lit.
+ *
+ * The taps lie on a spiral that each pixel turns by its own angle, which makes the edge soft instead of stepped.
+ * @param {boolean} hasEffects
+ */
+export const sunlight = (hasEffects) => (hasEffects ? `
+uniform highp sampler2DShadow u_shadow_map;
+uniform mat4 u_to_shadow_map;
+uniform float u_texel;
+float sunlight(vec3 at, vec3 normal, float blur) {
+  // A point a little in front of the surface, so that no surface lies in its own shadow.
+  vec3 place = (u_to_shadow_map * vec4(at + normal * u_texel * (1.0 + 0.5 * blur), 1.0)).xyz;
+  if (any(lessThan(place.xy, vec2(0.0))) || any(greaterThan(place.xy, vec2(1.0)))) return 1.0;
+  // Beyond the depth of the map nothing casts a shadow, but much can lie in one.
+  float depth = min(place.z, 0.99999);
+  float turn = 6.2832 * fract(52.9829 * fract(dot(gl_FragCoord.xy, vec2(0.06711, 0.00584))));
+  float texel = 1.0 / float(textureSize(u_shadow_map, 0).x);
+  float light = 0.0;
+  for (int tap = 0; tap < ${TAPS}; tap++) {
+    float angle = float(tap) * 2.39996 + turn;
+    float away = blur * texel * sqrt((float(tap) + 0.5) / ${TAPS.toFixed(1)});
+    light += textureLod(u_shadow_map, vec3(place.xy + away * vec2(cos(angle), sin(angle)), depth), 0.0);
+  }
+  return light / ${TAPS.toFixed(1)};
+}
+` : "float sunlight(vec3 at, vec3 normal, float blur) { return 1.0; }\n");
+
+/** Edges of shadows in texels: on the scene itself, and on the ground. */
+export const BLUR = { scene: "2.5", ground: "9.0" };
 
 /** Uniforms of the shadow pass. Anything below the ground casts no shadow. */
 export const SHADOW = `

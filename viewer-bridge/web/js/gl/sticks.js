@@ -2,18 +2,45 @@
 // are only one pixel wide.
 
 import { STICK } from "../state/topology.js";
-import { Program } from "./context.js";
-import { CORNER, HEADER, HEAT, SCREEN, SHADOW, positionReader } from "./shaders.js";
+import { Program, UNITS } from "./context.js";
+import { BLUR, CORNER, HEADER, HEAT, LIGHT, SCREEN, SHADOW, positionReader, sunlight } from "./shaders.js";
 
-/** Words per instance: two ends, rest length as f32 bits, style. */
-const WORDS = 4;
+/** Words per instance: two ends, rest length as f32 bits, style, radius as a solid body as f32 bits. */
+const WORDS = 5;
+
+/**
+ * Defines rod(t, aside), the colour of a solid rod at a fraction of its length, and at a distance from its
+ * axis in radii. The quad of a stick faces the eye, so its normal follows from both. Defines place(alpha), which sets its depth.
+ */
+const ROD = `
+uniform vec3 u_right;
+uniform vec3 u_upward;
+uniform vec3 u_eye;
+uniform vec3 u_body;
+vec3 rod(float t, vec2 aside) {
+  vec3 axis = normalize(v_ends[1] - v_ends[0] + vec3(1e-20));
+  vec3 at = mix(v_ends[0], v_ends[1], t);
+  vec3 to_eye = normalize(u_eye - at);
+  vec3 facing = normalize(to_eye - axis * dot(to_eye, axis) + vec3(1e-20));
+  vec3 normal = normalize(u_right * aside.x + u_upward * aside.y + facing * sqrt(max(0.0, 1.0 - dot(aside, aside))));
+  vec3 surface = at + normal * v_radius;
+  return lit(u_body, surface, normal, to_eye, 0.4, sunlight(surface, normal, ${BLUR.scene}));
+}
+// The half transparent pixels at the edge lie behind, or they would hide the next rod of the same rope.
+void place(float alpha) { gl_FragDepth = gl_FragCoord.z + (v_radius > 0.0 && alpha < 1.0 ? 1e-3 : 0.0); }
+`;
+const NO_ROD = `
+vec3 rod(float t, vec2 aside) { return vec3(0.0); }
+void place(float alpha) {}
+`;
 
 /** Computes the ends in pixels, and the quad around them. Divides by w here, so that interpolation is
- * linear on the screen. Clips an end behind the eye to the near plane. @param {boolean} isQuantised */
-const vertex = (isQuantised) => `${HEADER}${SHADOW}${CORNER}
+ * linear on the screen. Clips an end behind the eye to the near plane. @param {import("./context.js").Variant} variant */
+const vertex = ({ isQuantised }) => `${HEADER}${SHADOW}${CORNER}
 layout(location = 0) in uvec2 a_ends;
 layout(location = 1) in float a_rest_length;
 layout(location = 2) in uint a_style;
+layout(location = 3) in float a_radius;
 uniform mat4 u_view_projection;
 uniform vec2 u_viewport;
 uniform float u_pixels_per_unit;
@@ -22,6 +49,9 @@ uniform float u_radius_min;
 uniform float u_near;
 uniform float u_forward;
 uniform float u_is_all;
+uniform float u_is_solid;
+flat out vec3 v_ends[2];
+flat out float v_radius;
 out vec2 v_pixel;
 flat out vec4 v_segment;
 flat out vec2 v_radii;
@@ -32,7 +62,8 @@ ${positionReader(isQuantised)}
 void main() {
   uint kind = a_style & ${STICK.kindMask}u;
   bool is_hidden = (a_style & ${STICK.isGone}u) != 0u;
-  bool is_thread = kind == 0u && (a_style & ${STICK.isCovered}u) == 0u;
+  bool is_solid = u_is_solid > 0.5 && a_radius > 0.0;
+  bool is_thread = kind == 0u && ((a_style & ${STICK.isCovered}u) == 0u || is_solid);
   gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
   if (is_hidden || !(u_is_all > 0.5 || is_thread)) return;
   vec3 xa = position(a_ends.x);
@@ -44,7 +75,10 @@ void main() {
   if (b.w < u_near) b = mix(b, a, (u_near - b.w) / (a.w - b.w));
   vec2 pa = (a.xy / a.w * 0.5 + 0.5) * u_viewport;
   vec2 pb = (b.xy / b.w * 0.5 + 0.5) * u_viewport;
-  vec2 radii = max(vec2(u_radius_min), u_radius * u_pixels_per_unit / vec2(a.w, b.w));
+  v_ends[0] = xa;
+  v_ends[1] = xb;
+  v_radius = is_solid ? a_radius : 0.0;
+  vec2 radii = max(vec2(u_radius_min), (is_solid ? a_radius : u_radius) * u_pixels_per_unit / vec2(a.w, b.w));
   if (kind != 0u) radii *= 0.6;
   vec2 at = corner();
   vec2 along = pb - pa;
@@ -62,7 +96,10 @@ void main() {
 }
 `;
 
-const FRAGMENT = `${HEADER}${SHADOW}${SCREEN}${HEAT}
+/** @param {import("./context.js").Variant} variant */
+const fragment = ({ hasEffects }) => `${HEADER}${SHADOW}${SCREEN}${HEAT}
+flat in vec3 v_ends[2];
+flat in float v_radius;
 in vec2 v_pixel;
 flat in vec4 v_segment;
 flat in vec2 v_radii;
@@ -73,12 +110,14 @@ uniform vec3 u_stick;
 uniform vec3 u_stick_faint;
 uniform float u_round;
 uniform float u_opacity;
+${hasEffects ? LIGHT + sunlight(true) + ROD : NO_ROD}
 void main() {
   vec2 along = v_segment.zw - v_segment.xy;
   float t = clamp(dot(v_pixel - v_segment.xy, along) / max(dot(along, along), 1e-6), 0.0, 1.0);
   float radius = mix(v_radii.x, v_radii.y, t);
   float away = length(v_pixel - v_segment.xy - along * t);
   float alpha = clamp(radius + 0.5 - away, 0.0, 1.0);
+  place(alpha);
   if (u_shadow > 0.0) {
     if (alpha < 0.5 || v_height < 0.0) discard;
     o_color = vec4(0.0, 0.0, 0.0, u_shadow);
@@ -88,17 +127,19 @@ void main() {
   vec3 base = u_heat_max > 0.0 ? heat(v_strain) : v_kind == 0u ? u_stick : u_stick_faint;
   // A thick stick is shaded like a rod: darker towards its edges.
   float edge = clamp(away / max(radius, 1e-3), 0.0, 1.0);
-  float rod = mix(1.0, 0.45 + 0.65 * sqrt(1.0 - edge * edge), u_round * smoothstep(1.5, 4.0, radius));
-  o_color = screen(base * rod, alpha * u_opacity);
+  float shade = mix(1.0, 0.45 + 0.65 * sqrt(1.0 - edge * edge), u_round * smoothstep(1.5, 4.0, radius));
+  bool is_lit = v_radius > 0.0 && u_heat_max <= 0.0;
+  vec2 aside = (v_pixel - v_segment.xy - along * t) / max(radius, 1e-3);
+  o_color = screen(is_lit ? rod(t, aside) : base * shade, alpha * (is_lit ? 1.0 : u_opacity));
 }
 `;
 
 export class Sticks {
-  /** @param {WebGL2RenderingContext} gl @param {boolean} isQuantised */
-  constructor(gl, isQuantised) {
+  /** @param {WebGL2RenderingContext} gl @param {import("./context.js").Variant} variant */
+  constructor(gl, variant) {
     this.gl = gl;
-    this.program = new Program(gl, vertex(isQuantised), FRAGMENT);
-    this.program.setSamplers({ u_positions: 0 });
+    this.program = new Program(gl, vertex(variant), fragment(variant));
+    this.program.setSamplers(UNITS);
     this.vao = gl.createVertexArray();
     this.buffer = gl.createBuffer();
     /** Constraints, in the order of the instances. */
@@ -106,17 +147,18 @@ export class Sticks {
     this.words = new Uint32Array(0);
   }
 
-  /** @param {import("../net/wire.js").Scene} scene @param {Uint32Array} drawn @param {Uint8Array} styles */
-  setSticks(scene, drawn, styles) {
+  /** @param {import("../net/wire.js").Scene} scene @param {Uint32Array} drawn @param {Uint8Array} styles @param {Float32Array} radii of all constraints */
+  setSticks(scene, drawn, styles, radii) {
     const { gl } = this;
     this.drawn = drawn;
     this.words = new Uint32Array(drawn.length * WORDS);
-    const lengths = new Float32Array(this.words.buffer);
+    const numbers = new Float32Array(this.words.buffer);
     drawn.forEach((constraint, k) => {
       this.words[k * WORDS] = scene.ends[2 * constraint];
       this.words[k * WORDS + 1] = scene.ends[2 * constraint + 1];
-      lengths[k * WORDS + 2] = scene.restLengths[constraint];
+      numbers[k * WORDS + 2] = scene.restLengths[constraint];
       this.words[k * WORDS + 3] = styles[constraint];
+      numbers[k * WORDS + 4] = radii[constraint];
     });
     gl.bindVertexArray(this.vao);
     gl.bindBuffer(gl.ARRAY_BUFFER, this.buffer);
@@ -124,7 +166,8 @@ export class Sticks {
     gl.vertexAttribIPointer(0, 2, gl.UNSIGNED_INT, WORDS * 4, 0);
     gl.vertexAttribPointer(1, 1, gl.FLOAT, false, WORDS * 4, 8);
     gl.vertexAttribIPointer(2, 1, gl.UNSIGNED_INT, WORDS * 4, 12);
-    for (const location of [0, 1, 2]) {
+    gl.vertexAttribPointer(3, 1, gl.FLOAT, false, WORDS * 4, 16);
+    for (const location of [0, 1, 2, 3]) {
       gl.enableVertexAttribArray(location);
       gl.vertexAttribDivisor(location, 1);
     }

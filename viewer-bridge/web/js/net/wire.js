@@ -13,16 +13,18 @@
  *   min: Vec3, max: Vec3, rateHz: number, origin: Vec3,
  *   positions: Float32Array, ends: Uint32Array, restLengths: Float32Array, triangles: Uint32Array,
  *   constraintKinds: Uint8Array, name: string, unit: string, up: string, runId: string,
- *   meshes: Map<number, ColliderMesh>,
+ *   meshes: Map<number, ColliderMesh>, shapes: Shape[],
  * }} Scene  array lengths for n particles, s constraints and t triangles: 3 n, 2 s, s, 3 t, s
+ *
+ * @typedef {{ shape: string, first: number, count: number }} Shape  a generated shape, with its particles
  *
  * @typedef {Header & {
  *   kind: "frame", simTime: number, particleCount: number,
  *   isPaused: boolean, isReplay: boolean, isSaturated: boolean,
- *   lo: Vec3, scale: Vec3, tornCount: number, solveUs: number, wakeLateUs: number,
+ *   lo: Vec3, scale: Vec3, bounds: import("../geometry/math.js").Box, tornCount: number, solveUs: number, wakeLateUs: number,
  *   number: number, publishedNs: bigint, isQuantised: boolean,
  *   positions: Float32Array | Uint16Array, nonFinite: Uint32Array,
- * }} Frame  coordinate = lo + scale · value; lo is 0 and scale 1 unless quantised
+ * }} Frame  coordinate = lo + scale · value; lo is 0 and scale 1 unless quantised; bounds is a box around them
  *
  * @typedef {Header & { kind: "tear", first: number, constraints: Uint32Array }} Tear
  * @typedef {Header & { kind: "pins", particles: Uint32Array, flags: Uint32Array }} Pins
@@ -55,6 +57,8 @@ export const PIN = Object.freeze({ pinned: 1, grabbed: 2, anchored: 4, frozen: 8
 /** Constraint kinds in SCENE. */
 export const CONSTRAINT = Object.freeze({ structural: 0, shear: 1, bend: 2, tether: 3 });
 
+/** Greatest value of a quantised coordinate. */
+const QUANTA = 65_535;
 const VERSION = 1;
 const SHAPES = /** @type {const} */ (["plane", "box", "sphere", "capsule", "bounds", "mesh"]);
 const COLLIDER_BYTES = 120;
@@ -157,7 +161,7 @@ function decodeScene(reader, header) {
     kind: "scene", ...header, particleCount, constraintCount, triangleCount,
     isPlanar: (flags & 1) !== 0,
     min, max, rateHz, origin, positions, ends, restLengths, triangles, constraintKinds,
-    name: json.name ?? "", unit: json.unit ?? "m", up: json.up ?? "y", runId: json.run_id ?? "",
+    name: json.name ?? "", unit: json.unit ?? "m", up: json.up ?? "y", runId: json.run_id ?? "", shapes: json.shapes ?? [],
     meshes: decodeMeshes(reader),
   };
 }
@@ -192,6 +196,7 @@ function decodeFrame(reader, header, isQuantised) {
   return {
     kind: "frame", ...header, simTime, particleCount,
     isPaused: (flags & 1) !== 0, isReplay: (flags & 2) !== 0, isSaturated: (flags & 4) !== 0,
+    bounds: { min: lo, max: /** @type {Vec3} */ (lo.map((value, axis) => value + scale[axis] * (isQuantised ? QUANTA : 1))) },
     lo: isQuantised ? lo : [0, 0, 0], scale: isQuantised ? scale : [1, 1, 1],
     tornCount, solveUs, wakeLateUs, number, publishedNs, isQuantised, positions,
     nonFinite: reader.array(Uint32Array, nonFiniteCount),

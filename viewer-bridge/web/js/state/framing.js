@@ -1,7 +1,9 @@
-// The box that the first view of a scene shows: the scene, and the space that it will move into.
+// The boxes that views of a scene show: the first one with the space that the scene will move into, a fitted one
+// without.
 
 import { add, addScaled, boxOf, dot, length, scale, subtract } from "../geometry/math.js";
 import { PIN } from "../net/wire.js";
+import { polesOf } from "./shapes.js";
 
 /** @typedef {import("../geometry/math.js").Vec3} Vec3 */
 /** @typedef {import("../geometry/math.js").Box} Box */
@@ -13,19 +15,23 @@ const POINT_ROOM = 0.5;
 /** Greatest distance of a floor and of a solid that are still framed, in sizes of the scene. */
 const FLOOR_SIZES = 3;
 const SOLID_SIZES = 1;
-/** Margin on each side of a scene that anchors move, as a fraction of its size. */
+/** Margin on each side of a scene that anchors move, and of a flag in the wind, as fractions of its size. */
 const CARRIED_ROOM = 0.2;
+const FLYING_ROOM = 0.04;
 
 /** @param {import("./simulation.js").Simulation} simulation @returns {Box} */
 export function firstViewBox(simulation) {
   const bounds = simulation.colliders.find((one) => one.shape === "bounds");
   if (bounds) return { min: bounds.a, max: bounds.b };
   const { up } = simulation.axes();
-  const box = heldBox(simulation);
-  if (length(subtract(box.max, box.min)) === 0) grow(box, POINT_ROOM);
+  const box = roomyBox(simulation);
   const size = length(subtract(box.max, box.min));
   const middle = scale(add(box.min, box.max), 0.5);
-  const floor = simulation.ground ?? simulation.floor() ?? (simulation.lowest === null ? null : { normal: up, offset: simulation.lowest });
+  const isFlying = isFlag(simulation);
+  if (isFlying) grow(box, FLYING_ROOM * size);
+  // A flag does not hang while the wind blows.
+  const hangs = simulation.lowest === null || isFlying ? null : { normal: up, offset: simulation.lowest };
+  const floor = simulation.ground ?? simulation.floor() ?? hangs;
   if (floor !== null) {
     const drop = dot(floor.normal, middle) - floor.offset;
     if (drop > 0 && drop < FLOOR_SIZES * size) include(box, addScaled(middle, up, -drop));
@@ -35,8 +41,37 @@ export function firstViewBox(simulation) {
     if (pivot !== null) for (const axis of [0, 1, 2]) if (up[axis] === 0) mirror(box, pivot, axis);
   }
   if ([...simulation.pins.values()].some((flags) => (flags & PIN.anchored) !== 0)) grow(box, CARRIED_ROOM * size);
-  for (const one of simulation.colliders) includeSolid(box, boundingSphere(one, simulation.scene?.meshes.get(one.index)), middle, size);
+  includeSolids(box, simulation);
   return box;
+}
+
+/** The box of the scene as it is now, with the solids beside it. @param {import("./simulation.js").Simulation} simulation @returns {Box} */
+export function fittedBox(simulation) {
+  const bounds = simulation.colliders.find((one) => one.shape === "bounds");
+  if (bounds) return { min: bounds.a, max: bounds.b };
+  const box = roomyBox(simulation);
+  includeSolids(box, simulation);
+  return box;
+}
+
+/** The box of the particles that belong to the scene, with room around a single point. @param {import("./simulation.js").Simulation} simulation */
+function roomyBox(simulation) {
+  const box = heldBox(simulation);
+  if (length(subtract(box.max, box.min)) === 0) grow(box, POINT_ROOM);
+  return box;
+}
+
+/** True for cloth on a pole in a scene with wind. @param {import("./simulation.js").Simulation} simulation */
+function isFlag(simulation) {
+  const wind = simulation.parameters?.initial?.wind_velocity;
+  return Array.isArray(wind) && wind.some((axis) => axis !== 0) && polesOf(simulation).length > 0;
+}
+
+/** Includes the solids that are close to a box, and no bigger than it. @param {Box} box @param {import("./simulation.js").Simulation} simulation */
+export function includeSolids(box, simulation) {
+  const size = length(subtract(box.max, box.min));
+  const middle = scale(add(box.min, box.max), 0.5);
+  for (const one of simulation.colliders) includeSolid(box, boundingSphere(one, simulation.scene?.meshes.get(one.index)), middle, size);
 }
 
 /** The box of the particles that still belong to the scene: those that something holds, or the largest part

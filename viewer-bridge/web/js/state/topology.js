@@ -92,13 +92,13 @@ export class Topology {
     }
   }
 
-  /** The vertices and indices of the pieces of split triangles, as `splitPieces` returns them. */
-  pieces() {
+  /** The vertices and indices of the pieces of split triangles, as `splitPieces` returns them. @param {(triangle: number) => boolean} isDrawn */
+  pieces(isDrawn = () => true) {
     const { triangles, particleCount } = this.scene;
     const cornersAt = (/** @type {number} */ particle) => this.cornerByEntry.subarray(this.fanRanges[2 * particle], this.fanRanges[2 * particle] + this.fanRanges[2 * particle + 1]);
     const isTorn = (/** @type {number} */ corner) => this.isTornEdge(corner, cornersAt);
     const restLength = (/** @type {number} */ corner) => this.restLength(corner);
-    return splitPieces({ triangles, cornersAt, isTorn, restLength }, this.split, particleCount);
+    return splitPieces({ triangles, cornersAt, isTorn, restLength }, [...this.split].filter(isDrawn), particleCount);
   }
 
   /** True if the edge from a corner to the next is torn. An edge without constraints holds as long as a

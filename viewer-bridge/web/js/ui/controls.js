@@ -1,6 +1,6 @@
 // The top bar: buttons, scene picker and help, with their keyboard shortcuts.
 
-import { find } from "./dom.js";
+import { enable, find } from "./dom.js";
 import { MODES } from "../tools/input.js";
 import { listenToKeys, returnFocus } from "./keys.js";
 import { SceneMenu, neighbour } from "./scene-menu.js";
@@ -50,7 +50,7 @@ export class Controls {
     this.reset.addEventListener("click", () => this.app.commands.run("reset"));
     this.scene.addEventListener("click", () => this.openMenu());
     for (const button of this.modes) button.addEventListener("click", () => this.setMode(/** @type {Mode} */ (button.dataset.mode)));
-    find("frame", HTMLButtonElement).addEventListener("click", () => this.views.frame());
+    find("frame", HTMLButtonElement).addEventListener("click", () => this.views.fit());
     find("picture", HTMLButtonElement).addEventListener("click", () => this.views.savePicture());
     find("link", HTMLButtonElement).addEventListener("click", () => this.views.copyLink());
     find("help", HTMLButtonElement).addEventListener("click", () => this.help.showModal());
@@ -68,13 +68,14 @@ export class Controls {
       ".": () => this.stepOnce(1),
       ",": () => { if (app.simulation.isReplay) this.stepOnce(-1); },
       r: () => { if (!this.reset.disabled) app.commands.run("reset"); },
-      f: () => views.frame(),
+      f: () => views.fit(),
       s: () => views.savePicture(),
       v: () => this.togglePanel(),
       h: () => views.toggle("heat"),
       e: () => views.toggle("sticks"),
       k: () => views.toggle("particles"),
       n: () => views.toggle("forces"),
+      x: () => views.toggle("effects"),
       g: () => this.setMode("grab"),
       b: () => this.setMode("brush"),
       c: () => this.setMode("cut"),
@@ -181,8 +182,9 @@ export class Controls {
     const { simulation } = this.app;
     const gone = simulation.isAlive ? "" : simulation.isConnected ? "No node is running." : "There is no connection to the bridge.";
     const recorded = (/** @type {string} */ reason) => gone || (simulation.isRecording ? reason : "");
-    this.pause.setAttribute("aria-pressed", String(simulation.isPaused));
-    setText(this.pause, simulation.isPaused ? "Resume" : "Pause");
+    const isPaused = simulation.isPaused && gone === "";
+    this.pause.setAttribute("aria-pressed", String(isPaused));
+    setText(this.pause, isPaused ? "Resume" : "Pause");
     enable(this.pause, gone);
     enable(this.step, gone);
     enable(this.reset, recorded("A recording cannot be reset. Use the timeline to go back."));
@@ -199,11 +201,4 @@ export class Controls {
 function setText(button, text) {
   const label = button.querySelector("span");
   if (label !== null && label.textContent !== text) label.textContent = text;
-}
-
-/** Enables a control if there is no reason against it. @param {HTMLButtonElement} control @param {string} reason */
-function enable(control, reason) {
-  control.dataset.title ??= control.title;
-  control.disabled = reason !== "";
-  control.title = reason || control.dataset.title;
 }

@@ -23,6 +23,13 @@ export function make(tag, attributes = {}, ...children) {
   return element;
 }
 
+/** Enables a control if there is no reason against it; its tooltip gives the reason. @param {HTMLButtonElement | HTMLInputElement | HTMLSelectElement} control @param {string} reason */
+export function enable(control, reason) {
+  control.dataset.title ??= control.title;
+  control.disabled = reason !== "";
+  control.title = reason || control.dataset.title;
+}
+
 /** Clears a canvas, sizes it to device pixels, and returns its context with the size in CSS pixels. @param {HTMLCanvasElement} canvas */
 export function sharpContext(canvas) {
   const ratio = Math.min(devicePixelRatio || 1, 2);

@@ -1,7 +1,7 @@
 // The view: display toggles, strain scale, first view of a scene, saved pictures, links.
 
 import { find, sharpContext } from "./dom.js";
-import { firstViewBox } from "../state/framing.js";
+import { firstViewBox, fittedBox } from "../state/framing.js";
 import { formatLink } from "./link.js";
 import { readable } from "./format.js";
 import { niceCeiling } from "../geometry/round.js";
@@ -15,6 +15,8 @@ const HEAT_MIN = 0.002;
 const HEAT_MEANS = 8;
 /** Yaw and pitch of the first view, in radians. */
 const FIRST_VIEW = { yaw: 0.42, pitch: 0.16 };
+/** Shapes that effects draw as solid bodies. */
+const SOLID_SHAPES = new Set(["rope", "ragdoll"]);
 /** Limit on particles up to which scenes without a surface show them. */
 const SHOW_PARTICLES_MAX = 400;
 
@@ -57,7 +59,9 @@ export class Views {
     this.isFramed = false;
     this.isFollowing = false;
     const hasSurface = scene.triangleCount > 0;
-    const defaults = { heat: false, sticks: !hasSurface || scene.isPlanar, particles: !hasSurface && scene.particleCount <= SHOW_PARTICLES_MAX };
+    // Solid ropes and limbs would only wear their particles as beads.
+    const isSolid = renderer.hasEffects() && scene.shapes.some((one) => SOLID_SHAPES.has(one.shape));
+    const defaults = { heat: false, sticks: !hasSurface || scene.isPlanar, particles: !hasSurface && !isSolid && scene.particleCount <= SHOW_PARTICLES_MAX };
     Object.assign(renderer.toggles, defaults, Object.fromEntries(this.chosen));
     this.show();
     this.showFirstView();
@@ -86,11 +90,16 @@ export class Views {
     return [...camera.target, camera.distance];
   }
 
-  /** Shows the whole scene as it is now, from the current direction. */
-  frame() {
-    const { camera, renderer, simulation } = this.app;
+  /** Fills the picture with the scene as it is now, from the current direction. */
+  fit() {
+    this.frame(fittedBox(this.app.simulation));
+  }
+
+  /** @param {import("../geometry/math.js").Box} box */
+  frame(box) {
+    const { camera, renderer } = this.app;
     const { width, height } = renderer.viewport;
-    camera.frame(firstViewBox(simulation), width / height);
+    camera.frame(box, width / height);
     this.framed = this.framing();
     this.isFramed = true;
     renderer.isDirty = true;
@@ -104,7 +113,7 @@ export class Views {
     }
     if (this.resetStep !== null && simulation.frame !== null && (simulation.isReplay || simulation.frame.step >= this.resetStep)) {
       this.resetStep = null;
-      if (this.isFollowing || String(this.framed) === String(this.framing())) this.frame();
+      if (this.isFollowing || String(this.framed) === String(this.framing())) this.frame(firstViewBox(simulation));
     }
     if (!this.isFollowing) return;
     const { min, max } = simulation.box();
