@@ -2,7 +2,7 @@
 
 use serde_json::json;
 
-use crate::support::Rig;
+use crate::support::{Area, Rig};
 
 /// Counts the controls that are visible and match a condition on `one` and its rectangle `box`.
 fn controls(rig: &Rig, condition: &str) -> f64 {
@@ -21,10 +21,25 @@ fn a_phone_can_fit_the_view_and_hit_every_button() {
     rig.tab.call("Emulation.setDeviceMetricsOverride", phone);
     rig.tab.wait("innerWidth === 390");
     assert_eq!(controls(&rig, "one.id === 'frame' && box.right <= innerWidth"), 1.0);
-    assert_eq!(
-        controls(&rig, "one.tagName === 'BUTTON' && Math.min(box.width, box.height) < 24"),
-        0.0
-    );
+    assert!(controls(&rig, "one.type === 'checkbox'") > 3.0);
+    assert_eq!(controls(&rig, "Math.min(box.width, box.height) < 24"), 0.0);
+}
+
+#[test]
+#[ignore = "needs Chromium"]
+fn screen_readers_hear_values_and_no_plots_or_clocks() {
+    let rig = Rig::new(&["curtain", "--paused"], "");
+    let sliders = "[...document.querySelectorAll('#parameters input[type=range]')]";
+    rig.tab.wait(&format!("{sliders}.length > 10"));
+    // Gravity along y, and a parameter that is off.
+    let text = |index: &str| rig.tab.evaluate(&format!("{index}.getAttribute('aria-valuetext')"));
+    assert_eq!(text(&format!("{sliders}[1]")), "-9.81 m/s²");
+    assert_eq!(text("document.querySelector('#set-tear_force')"), "off N");
+    assert_eq!(rig.tab.number(&format!("{sliders}.filter(one => !one.ariaValueText).length")), 0.0);
+    // A live region speaks at each change. An output is one unless it is turned off.
+    let regions = "[...document.querySelectorAll('output, [aria-live], [role=status]')]        .filter(one => one.ariaLive !== 'off').map(one => one.id).join()";
+    assert_eq!(rig.tab.evaluate(regions), "banner,notices,hashes");
+    assert!(rig.tab.number("document.querySelectorAll('#plots output').length") > 3.0);
 }
 
 #[test]
@@ -40,6 +55,13 @@ fn forced_colours_show_what_is_pressed() {
         ))
     };
     assert_ne!(background("grab"), background("cut"));
+    // Sliders and checkboxes differ from their background.
+    for selector in ["#parameters input[type=range]", "#parameters input[type=checkbox]"] {
+        rig.tab.evaluate(&format!("document.querySelector({selector:?}).scrollIntoView()"));
+        let at = rig.tab.pixel(selector, 0.5);
+        let colors = rig.tab.screenshot().colors(&Area::around(at, 12.0));
+        assert!(colors.len() > 1, "{selector} has the colour of its background");
+    }
 }
 
 #[test]

@@ -73,7 +73,11 @@ fn a_live_bridge_at_the_address_of_a_replay_hides_the_timeline() {
     let mut replay = ReplayRig::open(sandbox, &file, "");
     let timeline = "document.querySelector('#timeline').checkVisibility()";
     replay.tab.wait(timeline);
+    let enabled = "[...document.querySelectorAll('#timeline :is(button, input, select)')]\
+        .filter(one => !one.disabled).length";
+    assert_eq!(replay.tab.number(enabled), 6.0);
     replay.end();
+    assert_eq!(replay.tab.number(enabled), 0.0);
     replay.go_live("curtain");
     replay.tab.wait("viewer.connection === 'open' && viewer.scene === 'curtain'");
     replay.tab.wait(&format!("!{timeline} && viewer.step > 0 && viewer.mode === 'live'"));

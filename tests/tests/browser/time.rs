@@ -96,11 +96,14 @@ fn the_page_reconnects_to_a_restarted_bridge() {
     let enabled = "[...document.querySelectorAll('#pause, #step, #reset, #scene, #modes button, #parameters fieldset, #parameters-reset')].filter(one => !one.disabled).length";
     assert_eq!(rig.tab.evaluate(enabled), 0);
     assert_eq!(rig.tab.evaluate("document.querySelector('#figures').textContent"), "");
+    let values = "document.querySelector('#parameters').checkVisibility()";
+    assert_eq!(rig.tab.evaluate(values), false);
     let step = rig.state().step;
     rig.restart_bridge();
     rig.tab.wait(&format!(
         "viewer.connection === 'open' && viewer.banner === '' && viewer.step > {step}"
     ));
+    rig.tab.wait(values);
     rig.pause();
 }
 

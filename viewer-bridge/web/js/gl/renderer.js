@@ -153,6 +153,8 @@ export class Renderer {
     this.resize();
     this.uploadOrSimplify();
     const uniforms = this.uniforms();
+    // Its texture is bound even if nothing casts a shadow.
+    if (this.hasEffects()) this.shadowMap ??= new ShadowMap(gl);
     if (this.lightView !== null) this.drawShadowMap(uniforms, this.lightView);
     gl.viewport(0, 0, this.canvas.width, this.canvas.height);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT | gl.STENCIL_BUFFER_BIT);
@@ -324,13 +326,12 @@ export class Renderer {
 
   /** Draws what casts shadows, as the light sees it. @param {Uniforms} uniforms @param {import("./shadow-map.js").LightView} light */
   drawShadowMap(uniforms, light) {
-    this.shadowMap ??= new ShadowMap(this.gl);
     this.gl.disable(this.gl.BLEND);
     const casting = {
       ...uniforms, u_shadow: 1, u_view_projection: light.clip, u_viewport: [MAP_SIZE, MAP_SIZE],
       u_pixels_per_unit: 1 / light.texel, u_near: 0, u_radius_min: 0.7,
     };
-    this.shadowMap.draw(() => {
+    this.shadowMap?.draw(() => {
       this.colliders?.draw(casting);
       if (this.toggles.surface) this.drawables?.cloth.drawShadow(casting);
       this.drawables?.planks?.draw(casting);

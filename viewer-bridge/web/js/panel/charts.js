@@ -77,7 +77,7 @@ export class Charts {
 /** @param {string} title @param {string} unit @param {Line[]} lines @param {(() => number) | null} limit @param {() => string} text @returns {Chart} */
 function chart(title, unit, lines, limit, text) {
   const label = `${title}: ${lines.map((line) => line.name).join(", ")}`;
-  return { title, unit, lines, limit, text, canvas: make("canvas", { role: "img", "aria-label": label }), output: make("output"), lastTop: 0 };
+  return { title, unit, lines, limit, text, canvas: make("canvas", { role: "img", "aria-label": label }), output: make("output", { "aria-live": "off" }), lastTop: 0 };
 }
 
 /** @param {Chart} one */

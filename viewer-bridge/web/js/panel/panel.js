@@ -49,7 +49,8 @@ export class Panel {
     const note = `${reason} ${this.doubt()}`.trim();
     this.note.hidden = note === "";
     this.note.textContent = note;
-    this.form.hidden = simulation.parameters?.values == null;
+    // Without a connection the values would be those of the past.
+    this.form.hidden = simulation.parameters?.values == null || !simulation.isConnected;
     this.resetButton.hidden = this.form.hidden;
     for (const refresh of this.refreshers) refresh();
     for (const element of this.form.querySelectorAll("fieldset")) element.disabled = reason !== "";

@@ -1,6 +1,6 @@
 // The timeline of a recording: marks, scrubbing and playback. Positions are steps, as in commands.
 
-import { cssColor, find, make, sharpContext } from "./dom.js";
+import { cssColor, enable, find, make, sharpContext } from "./dom.js";
 import { Scale, SeekGate, clockText, marksByPixel } from "./timeline.js";
 
 /** Rates to choose from; a different rate set by another page is added. */
@@ -52,6 +52,16 @@ export class TimelineBar {
     simulation.on("timeline", () => this.showRecording());
     simulation.on("playback", () => this.showPlayback());
     simulation.on("frame", (frame) => this.follow(frame.step));
+    simulation.on("connection", () => this.showConnection());
+  }
+
+  /** Disables the controls without a connection. */
+  showConnection() {
+    const reason = this.simulation.isConnected ? "" : "There is no connection to the bridge.";
+    for (const control of this.element.querySelectorAll("button, input, select")) enable(/** @type {HTMLButtonElement} */ (control), reason);
+    // A disabled slider reports no release.
+    this.isScrubbing = false;
+    this.showPlayback();
   }
 
   togglePlay() {
@@ -78,10 +88,11 @@ export class TimelineBar {
   }
 
   showPlayback() {
-    const { playback } = this.simulation;
+    const { playback, isConnected } = this.simulation;
     if (playback === null) return;
-    this.play.setAttribute("aria-pressed", String(playback.is_playing));
-    this.play.setAttribute("aria-label", playback.is_playing ? "Pause" : "Play");
+    const isPlaying = playback.is_playing && isConnected;
+    this.play.setAttribute("aria-pressed", String(isPlaying));
+    this.play.setAttribute("aria-label", isPlaying ? "Pause" : "Play");
     this.loop.setAttribute("aria-pressed", String(playback.is_looping));
     const rates = [...new Set([...RATES, playback.rate])].sort((a, b) => a - b);
     this.rate.replaceChildren(...rates.map((rate) => make("option", { value: rate, selected: rate === playback.rate }, `${rate} ×`)));
