@@ -112,7 +112,7 @@ impl Solver {
         let h = self.h();
         if let Some(measurement) = &mut self.measurement {
             let states = self.particles.states.as_slice();
-            measurement.end_step(&self.store, (&self.anchors, states), h);
+            measurement.end_step(&mut self.store, (&self.anchors, states), h);
         }
     }
 
@@ -135,7 +135,7 @@ impl Solver {
         self.store.unpack(&self.particles.states);
         self.particle_contacts.begin_step(&self.torn);
         if let Some(measurement) = &mut self.measurement {
-            measurement.begin_step(&mut self.store);
+            measurement.begin_step();
         }
         self.scene_step += 1;
         let (time_s, dt) = (self.scene_time_s(), self.step_length());

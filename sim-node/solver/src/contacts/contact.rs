@@ -6,7 +6,7 @@ mod response;
 
 use correction::{Advanced, corrected};
 use glam::Vec3;
-use reaction::{LaneContacts, LaneReaction, Reaction};
+use reaction::{BlockReaction, LaneContacts, LaneReaction, Reaction};
 use response::{Contact, respond};
 
 use super::hit::{Hit, LaneHit};
@@ -81,7 +81,7 @@ impl Contacts {
         &mut self,
         particles: &mut impl ParticleBlock,
         inputs: &SubstepInputs<'_>,
-        reactions: &mut [Reaction],
+        reactions: &mut [BlockReaction],
     ) {
         for obstacle in inputs.obstacles {
             if inputs.is_given_up() {
@@ -96,9 +96,11 @@ impl Contacts {
                     self.push_groups_out::<W>(particles, (obstacle, sphere), reaction);
                 }
                 Solid::Capsule { .. } | Solid::Box { .. } => {
+                    let reaction = reaction.map(|reaction| &mut reaction.single);
                     self.push_each_out::<W>(particles, obstacle, reaction);
                 }
                 Solid::Mesh(mesh) => {
+                    let reaction = reaction.map(|reaction| &mut reaction.single);
                     self.push_each_off::<W>(particles, (obstacle, mesh), inputs, reaction);
                 }
             }
@@ -111,7 +113,7 @@ impl Contacts {
         &mut self,
         particles: &mut impl ParticleBlock,
         (obstacle, solid): (&Obstacle, &impl LaneSolid),
-        reaction: Option<&mut Reaction>,
+        reaction: Option<&mut BlockReaction>,
     ) {
         let Obstacle { surface, zone, .. } = obstacle;
         let (zero, reach) = (W::splat(0.0), obstacle.solid.reach());

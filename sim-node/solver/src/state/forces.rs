@@ -56,8 +56,8 @@ pub(crate) struct Measurement {
     pub(crate) forces: Forces,
     /// By collider: sums over the step.
     reactions: Vec<Reaction>,
-    /// By collider: those of a substep.
-    substep: Vec<Reaction>,
+    /// By collider: contacts in a substep.
+    contacts: Vec<u32>,
     /// By fixed particle: impulse times the length of a substep.
     pulls: Vec<DVec3>,
     /// True while the store measures where fixed particles, their constraints and their tethers are.
@@ -78,7 +78,7 @@ impl Measurement {
         Self {
             forces: Forces { colliders, anchors, particles: Vec::new() },
             reactions: vec![Reaction::default(); collider_count],
-            substep: vec![Reaction::default(); collider_count],
+            contacts: vec![0; collider_count],
             pulls: Vec::new(),
             is_located: false,
         }
@@ -111,34 +111,34 @@ impl Measurement {
     }
 
     /// Forgets the last step.
-    pub(crate) fn begin_step(&mut self, store: &mut ParticleStore) {
-        store.clear_forces();
+    pub(crate) fn begin_step(&mut self) {
         self.pulls.fill(DVec3::ZERO);
         self.reactions.fill(Reaction::default());
     }
 
-    /// Adds the reactions of a substep.
+    /// Counts the contacts of a substep.
     pub(crate) fn end_substep(&mut self, store: &mut ParticleStore) {
-        self.substep.fill(Reaction::default());
-        store.take_reactions(&mut self.substep);
-        for (sum, reaction) in self.reactions.iter_mut().zip(&self.substep) {
-            add_substep(sum, reaction);
+        self.contacts.fill(0);
+        store.take_contacts(&mut self.contacts);
+        for (reaction, contacts) in self.reactions.iter_mut().zip(&self.contacts) {
+            reaction.contacts = reaction.contacts.max(*contacts);
         }
     }
 
     /// Adds the reaction of a substep to one collider.
     pub(crate) fn add(&mut self, collider: usize, reaction: &Reaction) {
-        add_substep(&mut self.reactions[collider], reaction);
+        self.reactions[collider].add_substep(reaction);
     }
 
     /// Computes the impulses of a step with substeps of `h` seconds.
     pub(crate) fn end_step(
         &mut self,
-        store: &ParticleStore,
+        store: &mut ParticleStore,
         (anchors, states): (&Anchors, &[Particle]),
         h: f32,
     ) {
-        store.add_pulls(&mut self.pulls);
+        store.take_pulls(&mut self.pulls);
+        store.take_reactions(&mut self.reactions);
         let rate = 1.0 / f64::from(h);
         let forces = &mut self.forces;
         for (impulse, reaction) in forces.colliders.iter_mut().zip(&self.reactions) {
@@ -172,12 +172,6 @@ impl Measurement {
             one.impulse = [0.0; 3];
         }
     }
-}
-
-fn add_substep(sum: &mut Reaction, reaction: &Reaction) {
-    let contacts = sum.contacts.max(reaction.contacts);
-    sum.add_all(reaction);
-    sum.contacts = contacts;
 }
 
 /// True for the flags of a particle that forces act on: pinned, grabbed or anchored.

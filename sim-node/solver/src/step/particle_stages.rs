@@ -4,7 +4,7 @@ use super::particle_block::ParticleBlock;
 use super::stage::Stage;
 use super::substep::SubstepInputs;
 use crate::contacts::contact::Contacts;
-use crate::contacts::contact::reaction::Reaction;
+use crate::contacts::contact::reaction::BlockReaction;
 use crate::kernels::lanes::Wide;
 
 /// Runs one stage on a block of particles. `contacts` carries the contacts of the block from
@@ -16,7 +16,7 @@ pub(crate) fn run_stage<W: Wide>(
     particles: &mut impl ParticleBlock,
     inputs: &SubstepInputs<'_>,
     contacts: &mut Contacts,
-    reactions: &mut [Reaction],
+    reactions: &mut [BlockReaction],
 ) {
     match stage {
         Stage::Predict => particles.predict::<W>(&inputs.prediction),

@@ -6,7 +6,7 @@ use super::graph::Graph;
 use super::graph::forces::Projections;
 use super::pulls::{Pull, Receivers, TetherEnds};
 use super::{Location, ParticleStore, find_sheet};
-use crate::contacts::contact::reaction::Reaction;
+use crate::contacts::contact::reaction::{BlockReaction, Reaction, ReactionSum};
 use crate::scene::model::Model;
 use crate::state::particles::Particle;
 
@@ -68,34 +68,42 @@ impl ParticleStore {
         }
     }
 
-    /// Forgets the forces of the last step.
-    pub(crate) fn clear_forces(&mut self) {
-        self.graph.forces_mut().clear();
-        for patch in &mut self.patches {
-            patch.forces_mut().clear();
-        }
-    }
-
-    /// Moves the reactions of a substep to those of the colliders, in the order of the particles' blocks.
-    pub(crate) fn take_reactions(&mut self, totals: &mut [Reaction]) {
-        let sheets = self.patches.iter_mut().map(|patch| &mut patch.forces_mut().reactions);
-        let (parts, count) = (
-            std::iter::once(&mut self.graph.forces_mut().reactions).chain(sheets),
-            totals.len().max(1),
-        );
-        for block in parts.flat_map(|part| part.chunks_exact_mut(count)) {
-            let pairs = totals.iter_mut().zip(block);
-            for (total, reaction) in pairs.filter(|(_, reaction)| reaction.contacts > 0) {
-                total.add_all(&std::mem::take(reaction));
+    /// Moves the numbers of contacts in a substep, by collider, to their totals.
+    pub(crate) fn take_contacts(&mut self, totals: &mut [u32]) {
+        for block in self.reaction_blocks(totals.len()) {
+            for (total, reaction) in totals.iter_mut().zip(block) {
+                *total += std::mem::take(&mut reaction.single.contacts);
             }
         }
     }
 
-    /// Adds the impulses, times the length of a substep, to those of the fixed particles.
-    pub(crate) fn add_pulls(&self, impulses: &mut [DVec3]) {
-        self.graph.add_pulls(impulses);
-        for patch in &self.patches {
-            patch.add_pulls(impulses);
+    /// Moves the reactions of a step to those of the colliders, in the order of the particles' blocks.
+    pub(crate) fn take_reactions(&mut self, totals: &mut [Reaction]) {
+        let collider_count = totals.len();
+        for (collider, total) in totals.iter_mut().enumerate() {
+            let mut sum = ReactionSum::default();
+            for block in self.reaction_blocks(collider_count) {
+                sum.take(&mut block[collider]);
+            }
+            sum.add_to(total);
+        }
+    }
+
+    /// The reactions of each block, by collider.
+    fn reaction_blocks(
+        &mut self,
+        collider_count: usize,
+    ) -> impl Iterator<Item = &mut [BlockReaction]> {
+        let sheets = self.patches.iter_mut().map(|patch| &mut patch.forces_mut().reactions);
+        let parts = std::iter::once(&mut self.graph.forces_mut().reactions).chain(sheets);
+        parts.flat_map(move |part| part.chunks_exact_mut(collider_count.max(1)))
+    }
+
+    /// Moves the impulses of a step, times the length of a substep, to those of the fixed particles.
+    pub(crate) fn take_pulls(&mut self, impulses: &mut [DVec3]) {
+        self.graph.take_pulls(impulses);
+        for patch in &mut self.patches {
+            patch.take_pulls(impulses);
         }
     }
 

@@ -5,9 +5,9 @@
 //! alone. The measured changes are those that the particle really makes, so impulses and momentum agree up to
 //! the rounding of a sum.
 
-use std::ops::Range;
-
 use glam::DVec3;
+
+use crate::kernels::lanes::axes;
 
 /// A constraint or bend with a fixed particle, measured at a free one.
 #[derive(Debug, Clone, Copy)]
@@ -25,73 +25,62 @@ pub(crate) struct Pull {
 /// The pulls in the graph or in a sheet. Empty while nobody asks for forces.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Pulls {
-    /// By projection: its first run. One more at the end.
-    starts: Vec<u32>,
-    runs: Vec<Run>,
-    /// In the order of the runs.
+    /// By projection: its pulls.
+    ranges: Vec<PullRange>,
+    /// In the order of the projections.
     all: Vec<Pull>,
-    /// By run: the displacements before the projection, axis by axis, then the sums of their changes.
-    memory: Vec<f32>,
+    /// By pull.
+    changes: Vec<Change>,
 }
 
-/// Pulls of a projection whose free particles lie side by side.
-#[derive(Debug, Clone)]
-struct Run {
-    pulls: Range<usize>,
-    at: usize,
-}
+/// Indices of the first pull of a projection, and of the first one behind them.
+type PullRange = [u32; 2];
 
-/// Numbers of a run in memory for each of its pulls.
-const NUMBERS: usize = 6;
+/// What a projection changes at a free particle.
+#[derive(Debug, Clone, Copy)]
+struct Change {
+    /// Where the x displacement is among the numbers of all.
+    place: u32,
+    /// The displacement before the projection.
+    before: [f32; 3],
+    /// The sum of its changes in this step.
+    sum: [f32; 3],
+}
 
 impl Pulls {
     /// Sorts pulls for projections with numbers below `projection_count`.
+    #[allow(clippy::cast_possible_truncation, reason = "fewer than 2^32 pulls and numbers")]
     pub(crate) fn new(mut pulls: Vec<Pull>, projection_count: usize) -> Self {
         pulls.sort_unstable_by_key(|pull| (pull.projection, pull.at, pull.receiver));
-        let mut runs: Vec<Run> = Vec::new();
-        for (index, pull) in pulls.iter().enumerate() {
-            let is_next = |run: &&mut Run| {
-                let length = run.pulls.len();
-                pulls[run.pulls.start].projection == pull.projection && run.at + length == pull.at
-            };
-            match runs.last_mut().filter(is_next) {
-                Some(run) => run.pulls.end += 1,
-                None => runs.push(Run { pulls: index..index + 1, at: pull.at }),
-            }
+        let first = |number| pulls.partition_point(|pull| pull.projection < number) as u32;
+        let change =
+            |pull: &Pull| Change { place: pull.at as u32, before: [0.0; 3], sum: [0.0; 3] };
+        Self {
+            ranges: (0..projection_count)
+                .map(|number| [first(number), first(number + 1)])
+                .collect(),
+            changes: pulls.iter().map(change).collect(),
+            all: pulls,
         }
-        let first =
-            |number: usize| runs.partition_point(|run| pulls[run.pulls.start].projection < number);
-        #[allow(clippy::cast_possible_truncation, reason = "fewer than 2^32 constraints and bends")]
-        let starts = (0..=projection_count).map(|number| first(number) as u32).collect();
-        let memory = vec![0.0; NUMBERS * pulls.len()];
-        Self { starts, runs, all: pulls, memory }
     }
 
-    /// Returns true if somebody asks for forces.
-    pub(crate) fn is_measured(&self) -> bool {
-        !self.starts.is_empty()
-    }
-
-    /// Forgets the changes of the last step.
-    pub(crate) fn clear(&mut self) {
-        self.memory.fill(0.0);
+    /// Returns true if a projection has pulls.
+    #[inline(always)]
+    pub(crate) fn has(&self, projection: usize) -> bool {
+        self.ranges.get(projection).is_some_and(|[first, end]| first < end)
     }
 
     /// All projections.
     pub(crate) fn whole(&mut self) -> PullsPart<'_> {
-        let Self { starts, runs, memory, .. } = self;
-        PullsPart { starts, runs, memory, first: 0 }
+        PullsPart { ranges: &self.ranges, changes: &mut self.changes, first: 0 }
     }
 
-    /// Adds the impulses, times the length of a substep, to those of the fixed particles.
-    pub(crate) fn add_to(&self, impulses: &mut [DVec3]) {
-        for run in &self.runs {
-            let length = run.pulls.len();
-            let sums = &self.memory[NUMBERS * run.pulls.start + 3 * length..][..3 * length];
-            for (index, pull) in self.all[run.pulls.clone()].iter().enumerate() {
-                let change = [0, 1, 2].map(|axis| f64::from(sums[axis * length + index]));
-                impulses[pull.receiver] += DVec3::from_array(change) * f64::from(pull.factor);
-            }
+    /// Moves the impulses of a step, times the length of a substep, to those of the fixed particles.
+    pub(crate) fn take(&mut self, impulses: &mut [DVec3]) {
+        for (pull, change) in self.all.iter().zip(&mut self.changes) {
+            let sum = DVec3::from_array(change.sum.map(f64::from));
+            impulses[pull.receiver] += sum * f64::from(pull.factor);
+            change.sum = [0.0; 3];
         }
     }
 }
@@ -99,11 +88,10 @@ impl Pulls {
 /// The pulls of consecutive projections.
 #[derive(Debug)]
 pub(crate) struct PullsPart<'a> {
-    /// By projection of the graph or the sheet, as in [`Pulls`].
-    starts: &'a [u32],
-    runs: &'a [Run],
-    memory: &'a mut [f32],
-    /// Index of the first pull in memory.
+    /// By projection of the graph or the sheet.
+    ranges: &'a [PullRange],
+    changes: &'a mut [Change],
+    /// Index of the first pull in `changes`.
     first: usize,
 }
 
@@ -120,80 +108,43 @@ pub(crate) struct Numbers<'a> {
 impl<'a> PullsPart<'a> {
     /// Splits before a projection.
     pub(crate) fn split_at(self, projection: usize) -> (PullsPart<'a>, PullsPart<'a>) {
-        let Self { starts, runs, memory, first } = self;
-        let next = match starts.get(projection).and_then(|run| runs.get(*run as usize)) {
-            Some(run) => run.pulls.start,
-            None => first + memory.len() / NUMBERS,
-        };
-        let (before, behind) = memory.split_at_mut(NUMBERS * (next - first));
-        let part = |memory, first| PullsPart { starts, runs, memory, first };
+        let Self { ranges, changes, first } = self;
+        let end = first + changes.len();
+        let next = ranges.get(projection).map_or(end, |[next, _]| *next as usize);
+        let (before, behind) = changes.split_at_mut(next - first);
+        let part = |changes, first| PullsPart { ranges, changes, first };
         (part(before, first), part(behind, next))
     }
 
-    /// Returns true if a projection has pulls.
-    #[inline(always)]
-    pub(crate) fn has(&self, projection: usize) -> bool {
-        self.starts.get(projection) < self.starts.get(projection + 1)
-    }
-
     /// Notes the displacements before a projection.
+    #[inline(always)]
     pub(crate) fn note(&mut self, projection: usize, numbers: Numbers<'_>) {
-        for run in self.runs_of(projection) {
-            let length = run.pulls.len();
-            let noted = &mut self.memory[NUMBERS * (run.pulls.start - self.first)..][..3 * length];
-            if let [x, y, z] = noted {
-                [*x, *y, *z] = numbers.vector(run.at);
-                continue;
-            }
-            for axis in 0..3 {
-                noted[axis * length..][..length]
-                    .copy_from_slice(numbers.along(axis, run.at, length));
-            }
+        for change in self.of(projection) {
+            change.before = numbers.vector(change.place);
         }
     }
 
     /// Adds the changes since [`Self::note`].
+    #[inline(always)]
     pub(crate) fn add_changes(&mut self, projection: usize, numbers: Numbers<'_>) {
-        for run in self.runs_of(projection) {
-            let length = run.pulls.len();
-            let memory = &mut self.memory[NUMBERS * (run.pulls.start - self.first)..];
-            let (noted, sums) = memory[..NUMBERS * length].split_at_mut(3 * length);
-            if let [x, y, z] = sums {
-                let after = numbers.vector(run.at);
-                *x += after[0] - noted[0];
-                *y += after[1] - noted[1];
-                *z += after[2] - noted[2];
-                continue;
-            }
-            for axis in 0..3 {
-                let part = axis * length..(axis + 1) * length;
-                let pairs = sums[part.clone()].iter_mut().zip(&noted[part]);
-                for ((sum, before), after) in pairs.zip(numbers.along(axis, run.at, length)) {
-                    *sum += after - before;
-                }
-            }
+        for Change { place, before, sum } in self.of(projection) {
+            let after = numbers.vector(*place);
+            *sum = axes(|axis| sum[axis] + (after[axis] - before[axis]));
         }
     }
 
     #[inline(always)]
-    fn runs_of(&self, projection: usize) -> &'a [Run] {
-        match self.starts {
-            [] => &[],
-            starts => &self.runs[starts[projection] as usize..starts[projection + 1] as usize],
-        }
+    fn of(&mut self, projection: usize) -> &mut [Change] {
+        let [first, end] = self.ranges[projection].map(|index| index as usize);
+        &mut self.changes[first - self.first..end - self.first]
     }
 }
 
-impl<'a> Numbers<'a> {
+impl Numbers<'_> {
     #[inline(always)]
-    fn vector(&self, at: usize) -> [f32; 3] {
-        let (x, stride) = (at - self.first, self.stride);
-        [self.part[x], self.part[x + stride], self.part[x + 2 * stride]]
-    }
-
-    #[inline(always)]
-    fn along(&self, axis: usize, at: usize, length: usize) -> &'a [f32] {
-        &self.part[at - self.first + axis * self.stride..][..length]
+    fn vector(&self, place: u32) -> [f32; 3] {
+        let numbers = &self.part[place as usize - self.first..];
+        axes(|axis| numbers[axis * self.stride])
     }
 }
 

@@ -30,18 +30,56 @@ impl Reaction {
         self.angular += arm.as_dvec3().cross(linear);
     }
 
-    pub(crate) fn add_all(&mut self, other: &Self) {
+    /// Adds the contacts of a substep.
+    pub(crate) fn add_substep(&mut self, other: &Self) {
         self.linear += other.linear;
         self.angular += other.angular;
-        self.contacts += other.contacts;
+        self.contacts = self.contacts.max(other.contacts);
     }
 }
 
-/// A [`Reaction`] of particles in eight lanes.
+/// Sums over the contacts of a row or block of particles with a collider in a step.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct BlockReaction {
+    /// Of contacts that are handled one by one. It also counts all contacts of the substep.
+    pub(crate) single: Reaction,
+    /// Of contacts that are handled eight at a time, linear and angular, in the units of [`Reaction`].
+    lanes: [[Lanes8; 3]; 2],
+}
+
+/// The sum of block reactions, lane by lane.
+#[derive(Debug, Default)]
+pub(crate) struct ReactionSum {
+    single: Reaction,
+    lanes: [[[f64; 8]; 3]; 2],
+}
+
+impl ReactionSum {
+    /// Takes a block's impulses, not its contacts.
+    pub(crate) fn take(&mut self, block: &mut BlockReaction) {
+        let BlockReaction { single, lanes } = std::mem::take(block);
+        self.single.add_substep(&single);
+        let sums = self.lanes.as_flattened_mut().as_flattened_mut();
+        for (sum, lane) in sums.iter_mut().zip(lanes.as_flattened().as_flattened()) {
+            *sum += f64::from(*lane);
+        }
+    }
+
+    /// Adds the impulses to those of a reaction.
+    pub(crate) fn add_to(&self, total: &mut Reaction) {
+        let [linear, angular] = self
+            .lanes
+            .map(|sums| DVec3::from_array(map_axes(sums, |lanes| lanes.into_iter().sum())));
+        total.linear += self.single.linear + linear;
+        total.angular += self.single.angular + angular;
+    }
+}
+
+/// The contacts of eight particles after eight, before they are added to a [`BlockReaction`].
 pub(super) struct LaneReaction<W> {
     linear: [W; 3],
     angular: [W; 3],
-    contacts: W,
+    contacts: u32,
 }
 
 /// Eight contacts, or fewer.
@@ -58,7 +96,7 @@ impl<W: Wide> LaneReaction<W> {
     #[inline(always)]
     pub(super) fn new() -> Self {
         let zero = W::splat(0.0);
-        Self { linear: [zero; 3], angular: [zero; 3], contacts: zero }
+        Self { linear: [zero; 3], angular: [zero; 3], contacts: 0 }
     }
 
     #[inline(always)]
@@ -68,33 +106,19 @@ impl<W: Wide> LaneReaction<W> {
         let arm = difference(position, splat(center.to_array()));
         self.linear = sum(self.linear, linear);
         self.angular = sum(self.angular, masked(cross(arm, linear), is_hit));
-        self.contacts = self.contacts + W::splat(1.0).masked(is_hit);
+        self.contacts += W::bits(is_hit).count_ones();
     }
 
-    /// Adds the lanes to a sum, in order.
     #[inline(always)]
-    pub(super) fn add_to(self, reaction: &mut Reaction) {
-        let total = |lanes: W| {
-            let mut numbers: Lanes8 = [0.0; 8];
-            lanes.store(&mut numbers, 0);
-            total_of(&numbers)
-        };
-        let contacts = total(self.contacts);
-        if contacts == 0.0 {
+    pub(super) fn add_to(self, reaction: &mut BlockReaction) {
+        if self.contacts == 0 {
             return;
         }
-        reaction.linear += DVec3::from_array(map_axes(self.linear, total));
-        reaction.angular += DVec3::from_array(map_axes(self.angular, total));
-        #[allow(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a number of particles"
-        )]
-        let contacts = contacts as u32;
-        reaction.contacts += contacts;
+        reaction.single.contacts += self.contacts;
+        for (sums, lanes) in reaction.lanes.iter_mut().zip([self.linear, self.angular]) {
+            for (sum, lanes) in sums.iter_mut().zip(lanes) {
+                (W::load(sum, 0) + lanes).store(sum, 0);
+            }
+        }
     }
-}
-
-fn total_of(numbers: &Lanes8) -> f64 {
-    numbers.iter().map(|number| f64::from(*number)).sum()
 }

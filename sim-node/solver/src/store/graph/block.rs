@@ -5,7 +5,7 @@ use glam::Vec3;
 use crate::constraints::separation::RestLength;
 use crate::constraints::tether_pull::{Tethered, tether_excess};
 use crate::contacts::contact::Contacts;
-use crate::contacts::contact::reaction::Reaction;
+use crate::contacts::contact::reaction::BlockReaction;
 use crate::contacts::path::{LanePath, SubstepPath};
 use crate::kernels::lanes::{LaneWork, Lanes8, PackedParticle, Wide};
 use crate::kernels::vectors::{lane_of, load, store};
@@ -44,7 +44,7 @@ pub(crate) struct GraphBlock<'a> {
     /// taken in this step.
     pub(crate) tether_pulls: &'a mut [[f32; 3]],
     /// By [`BLOCK_GROUPS`] groups, then by collider; empty if nobody asks for forces.
-    pub(crate) reactions: &'a mut [Reaction],
+    pub(crate) reactions: &'a mut [BlockReaction],
     /// Number of reactions of a block.
     pub(crate) reaction_count: usize,
 }

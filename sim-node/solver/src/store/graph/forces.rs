@@ -1,7 +1,7 @@
 //! Forces of the particles of the graph on colliders and fixed particles.
 
 use super::group::ConstraintGroup;
-use crate::contacts::contact::reaction::Reaction;
+use crate::contacts::contact::reaction::BlockReaction;
 use crate::kernels::lanes::PackedParticle;
 use crate::store::pulls::{Numbers, Pulls};
 
@@ -11,7 +11,7 @@ pub(crate) struct GraphForces {
     pub(crate) pulls: Pulls,
     pub(crate) projections: Projections,
     /// By block, then by collider.
-    pub(crate) reactions: Vec<Reaction>,
+    pub(crate) reactions: Vec<BlockReaction>,
     /// Number of reactions of a block.
     pub(crate) reaction_count: usize,
     /// By particle and tether: mass times the displacement that the tether has taken.
@@ -55,14 +55,6 @@ impl Projections {
     }
 }
 
-impl GraphForces {
-    /// Forgets the last step.
-    pub(crate) fn clear(&mut self) {
-        self.pulls.clear();
-        self.tether_pulls.fill([0.0; 3]);
-    }
-}
-
 /// The particles that a group moves, and the pulls of its projections.
 pub(crate) struct MovedParticles<'a> {
     pub(crate) particles: &'a mut [PackedParticle],
@@ -75,7 +67,7 @@ impl MovedParticles<'_> {
     /// Notes the displacements before the projection with this number in the group.
     #[inline(always)]
     pub(crate) fn note(&mut self, number: usize) {
-        if self.pulls.is_measured() {
+        if self.pulls.has(self.first + number) {
             self.note_measured(number);
         }
     }
@@ -83,7 +75,7 @@ impl MovedParticles<'_> {
     /// Adds the changes since [`Self::note`].
     #[inline(always)]
     pub(crate) fn add_changes(&mut self, number: usize) {
-        if self.pulls.is_measured() {
+        if self.pulls.has(self.first + number) {
             self.add_measured_changes(number);
         }
     }

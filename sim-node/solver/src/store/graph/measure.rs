@@ -6,7 +6,7 @@ use super::Graph;
 use super::block::BLOCK_GROUPS;
 use super::forces::{GraphForces, Projections};
 use super::group::ConstraintGroup;
-use crate::contacts::contact::reaction::Reaction;
+use crate::contacts::contact::reaction::BlockReaction;
 use crate::store::pulls::{Pull, Pulls};
 
 impl Graph {
@@ -27,7 +27,7 @@ impl Graph {
             pulls: Pulls::new(pulls, projections.count),
             projections,
             reaction_count: collider_count,
-            reactions: vec![Reaction::default(); block_count * collider_count],
+            reactions: vec![BlockReaction::default(); block_count * collider_count],
             tether_pulls: vec![[0.0; 3]; self.tethers.len()],
             tether_receivers: vec![None; self.tethers.len()],
         };
@@ -47,13 +47,14 @@ impl Graph {
         self.forces.tether_receivers[tether] = Some(receiver);
     }
 
-    /// Adds the impulses, times the length of a substep, to those of the fixed particles.
-    pub(crate) fn add_pulls(&self, impulses: &mut [DVec3]) {
-        let GraphForces { pulls, tether_pulls, tether_receivers, .. } = &self.forces;
-        pulls.add_to(impulses);
-        for (pull, receiver) in tether_pulls.iter().zip(tether_receivers) {
+    /// Moves the impulses of a step, times the length of a substep, to those of the fixed particles.
+    pub(crate) fn take_pulls(&mut self, impulses: &mut [DVec3]) {
+        let GraphForces { pulls, tether_pulls, tether_receivers, .. } = &mut self.forces;
+        pulls.take(impulses);
+        for (pull, receiver) in tether_pulls.iter_mut().zip(tether_receivers) {
             if let Some(receiver) = receiver {
                 impulses[*receiver as usize] += DVec3::from_array(pull.map(f64::from));
+                *pull = [0.0; 3];
             }
         }
     }

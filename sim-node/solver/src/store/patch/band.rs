@@ -144,8 +144,9 @@ impl Band<'_> {
         }
         let (layout, length) = (self.layout, self.layout.row_length);
         let numbers = &mut self.numbers[(row - self.first) * length..][..length];
+        let is_measured = IS_MEASURED && matches!(scheduled.stage, Stage::Tether | Stage::Contact);
         let (reactions, tether_pulls): (&mut [_], &mut [_]) =
-            if IS_MEASURED { self.forces.of_row(row) } else { (&mut [], &mut []) };
+            if is_measured { self.forces.of_row(row) } else { (&mut [], &mut []) };
         let mut row = SheetRow::new(numbers, layout, row, tether_pulls);
         let contacts = &mut sweep.scratch.contacts;
         run_stage::<W>(scheduled.stage, &mut row, sweep.inputs, contacts, reactions);

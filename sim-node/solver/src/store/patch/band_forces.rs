@@ -1,56 +1,62 @@
 //! Forces of the particles of some rows on colliders and fixed particles.
 
 use super::row_layout::RowLayout;
-use crate::contacts::contact::reaction::Reaction;
+use crate::contacts::contact::reaction::BlockReaction;
 use crate::kernels::lanes::Lanes8;
 use crate::store::pulls::{Pulls, PullsPart};
+
+/// The displacements that tethers have taken from eight particles, axis by axis.
+pub(crate) type TetherPulls = [Lanes8; 3];
 
 /// The forces of a sheet. Empty while nobody asks for them.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct SheetForces {
     pub(crate) pulls: Pulls,
+    /// By row: bit n is set if its projection n has pulls.
+    pull_masks: Vec<u32>,
     /// By row, then by collider.
-    pub(crate) reactions: Vec<Reaction>,
+    pub(crate) reactions: Vec<BlockReaction>,
     /// Number of reactions of a row.
     reaction_count: usize,
-    /// By row, tether and axis: mass times the displacement that the tether of each particle has taken.
-    pub(crate) tether_pulls: Vec<Lanes8>,
+    /// By row, tether and eight columns: the displacements that tethers have taken in this step.
+    pub(crate) tether_pulls: Vec<TetherPulls>,
     /// Number of tether pulls of a row.
-    tether_length: usize,
-    /// By row, tether and column, padding included: index of the root among the fixed particles.
-    pub(crate) tether_receivers: Vec<Option<u32>>,
+    pub(crate) tether_length: usize,
+    /// By row, tether and eight columns: index of the root among the fixed particles.
+    pub(crate) tether_receivers: Vec<[Option<u32>; 8]>,
 }
 
 impl SheetForces {
     /// Makes room for a sheet, without tethers.
     pub(crate) fn new(pulls: Pulls, layout: &RowLayout, collider_count: usize) -> Self {
+        let count = layout.pull_groups();
+        let mask =
+            |row| (0..count).fold(0, |mask, n| mask | u32::from(pulls.has(row * count + n)) << n);
         let groups = layout.rows * layout.fields.scene.tethers * layout.columns.div_ceil(8);
         Self {
+            pull_masks: (0..layout.rows).map(mask).collect(),
             pulls,
-            reactions: vec![Reaction::default(); layout.rows * collider_count],
+            reactions: vec![BlockReaction::default(); layout.rows * collider_count],
             reaction_count: collider_count,
-            tether_pulls: vec![[0.0; 8]; 3 * groups],
-            tether_length: 3 * groups / layout.rows,
-            tether_receivers: vec![None; 8 * groups],
+            tether_pulls: vec![[[0.0; 8]; 3]; groups],
+            tether_length: groups / layout.rows,
+            tether_receivers: vec![[None; 8]; groups],
         }
     }
 
     /// Returns true if somebody asks for forces.
     pub(crate) fn is_measured(&self) -> bool {
-        self.pulls.is_measured()
-    }
-
-    /// Forgets the last step.
-    pub(crate) fn clear(&mut self) {
-        self.pulls.clear();
-        self.tether_pulls.fill([0.0; 8]);
+        !self.pull_masks.is_empty()
     }
 
     /// All rows.
     pub(crate) fn all(&mut self, layout: &RowLayout) -> BandForces<'_> {
-        let Self { pulls, reactions, reaction_count, tether_pulls, tether_length, .. } = self;
+        let Self {
+            pulls, pull_masks, reactions, reaction_count, tether_pulls, tether_length, ..
+        } = self;
         BandForces {
             first: 0,
+            pull_masks,
             pull_groups: layout.pull_groups(),
             reaction_count: *reaction_count,
             tether_length: *tether_length,
@@ -66,6 +72,8 @@ impl SheetForces {
 pub(crate) struct BandForces<'a> {
     /// Index of the first row.
     first: usize,
+    /// By row of the sheet: bit n is set if its projection n has pulls.
+    pull_masks: &'a [u32],
     /// Number of projections in a row.
     pull_groups: usize,
     /// Number of reactions of a row.
@@ -73,14 +81,14 @@ pub(crate) struct BandForces<'a> {
     /// Number of tether pulls of a row.
     tether_length: usize,
     pub(crate) pulls: PullsPart<'a>,
-    reactions: &'a mut [Reaction],
-    tether_pulls: &'a mut [Lanes8],
+    reactions: &'a mut [BlockReaction],
+    tether_pulls: &'a mut [TetherPulls],
 }
 
 impl<'a> BandForces<'a> {
     /// Splits before a row.
     pub(crate) fn split_at(self, row: usize) -> (BandForces<'a>, BandForces<'a>) {
-        let Self { first, pull_groups, reaction_count, tether_length, .. } = self;
+        let Self { first, pull_masks, pull_groups, reaction_count, tether_length, .. } = self;
         let count = row - first;
         let (pulls, other_pulls) = self.pulls.split_at(row * pull_groups);
         let (reactions, other_reactions) = self.reactions.split_at_mut(count * reaction_count);
@@ -88,6 +96,7 @@ impl<'a> BandForces<'a> {
             self.tether_pulls.split_at_mut(count * tether_length);
         let part = |first, pulls, reactions, tether_pulls| BandForces {
             first,
+            pull_masks,
             pull_groups,
             reaction_count,
             tether_length,
@@ -108,12 +117,12 @@ impl<'a> BandForces<'a> {
     /// Returns true if the projection of a group of a row has pulls.
     #[inline(always)]
     pub(crate) fn has_pulls(&self, row: usize, group: usize) -> bool {
-        self.pulls.has(self.projection(row, group))
+        self.pull_masks[row] >> group & 1 != 0
     }
 
     /// The reactions and the tether pulls of a row.
     #[inline(always)]
-    pub(crate) fn of_row(&mut self, row: usize) -> (&mut [Reaction], &mut [Lanes8]) {
+    pub(crate) fn of_row(&mut self, row: usize) -> (&mut [BlockReaction], &mut [TetherPulls]) {
         let row = row - self.first;
         (
             &mut self.reactions[row * self.reaction_count..][..self.reaction_count],

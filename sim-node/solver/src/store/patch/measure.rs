@@ -3,10 +3,10 @@
 use glam::DVec3;
 
 use super::Patch;
-use super::band_forces::SheetForces;
+use super::band_forces::{SheetForces, TetherPulls};
 use super::row_layout::RowLayout;
 use crate::constraints::families::Family;
-use crate::kernels::lanes::axes;
+use crate::kernels::lanes::{Lanes8, axes, lane_groups};
 use crate::store::pulls::{Pull, Pulls};
 
 impl Patch {
@@ -29,22 +29,37 @@ impl Patch {
     pub(crate) fn set_tether_receiver(&mut self, place: [usize; 2], slot: usize, receiver: u32) {
         let [row, column] = place;
         let RowLayout { columns, ref fields, .. } = self.layout;
-        let index = 8 * (row * fields.scene.tethers + slot) * columns.div_ceil(8) + column;
-        self.forces.tether_receivers[index] = Some(receiver);
+        let group = (row * fields.scene.tethers + slot) * columns.div_ceil(8) + column / 8;
+        self.forces.tether_receivers[group][column % 8] = Some(receiver);
     }
 
-    /// Adds the impulses, times the length of a substep, to those of the fixed particles.
-    pub(crate) fn add_pulls(&self, impulses: &mut [DVec3]) {
-        let SheetForces { pulls, tether_pulls, tether_receivers, .. } = &self.forces;
-        pulls.add_to(impulses);
-        let count = self.layout.columns.div_ceil(8);
-        let tethers = tether_pulls.chunks_exact(3 * count);
-        for (pulls, receivers) in tethers.zip(tether_receivers.chunks_exact(8 * count)) {
-            for (column, receiver) in receivers.iter().enumerate() {
-                let Some(receiver) = receiver else { continue };
-                let pull = axes(|axis| f64::from(pulls[axis * count + column / 8][column % 8]));
-                impulses[*receiver as usize] += DVec3::from_array(pull);
+    /// Moves the impulses of a step, times the length of a substep, to those of the fixed particles.
+    pub(crate) fn take_pulls(&mut self, impulses: &mut [DVec3]) {
+        let Self { layout, lines, forces, .. } = self;
+        forces.pulls.take(impulses);
+        let length = forces.tether_length;
+        let rows = bytemuck::cast_slice::<_, f32>(lines).chunks_exact(layout.row_length);
+        let count = layout.columns.div_ceil(8);
+        for group in 0..length {
+            // Tethers of a column often have one root.
+            let (mut sums, mut last) = ([[0.0; 8]; 3], &[None; 8]);
+            let pulls = forces.tether_pulls[group..].iter_mut().step_by(length);
+            let receivers = forces.tether_receivers[group..].iter().step_by(length);
+            for (row, (pulls, receivers)) in rows.clone().zip(pulls.zip(receivers)) {
+                // Many are slack in all of a step.
+                if is_zero(pulls) {
+                    continue;
+                }
+                if receivers != last {
+                    add_lanes(&sums, last, impulses);
+                    (sums, last) = ([[0.0; 8]; 3], receivers);
+                }
+                let inverse_masses = lane_groups(row, 3 * layout.stride, count)[group % count];
+                for (sum, pulls) in sums.iter_mut().zip(std::mem::take(pulls)) {
+                    add_momenta(sum, &pulls, &inverse_masses);
+                }
             }
+            add_lanes(&sums, last, impulses);
         }
     }
 
@@ -69,5 +84,32 @@ impl Patch {
     /// Where the x displacement of a particle is among the numbers of the sheet.
     pub(crate) fn displacement_place(&self, place: [usize; 2]) -> usize {
         self.particle_index(place) + 4 * self.layout.stride
+    }
+}
+
+#[inline(always)]
+fn is_zero(pulls: &TetherPulls) -> bool {
+    let all = pulls.as_flattened().iter();
+    all.fold(0, |bits, number| bits | number.to_bits()) == 0
+}
+
+/// Adds mass times displacement. Particles of inverse mass 0 have none.
+#[inline(always)]
+fn add_momenta(sums: &mut Lanes8, displacements: &Lanes8, inverse_masses: &Lanes8) {
+    for ((sum, displacement), inverse_mass) in
+        sums.iter_mut().zip(displacements).zip(inverse_masses)
+    {
+        let momentum = displacement / inverse_mass;
+        *sum += if *inverse_mass > 0.0 { momentum } else { 0.0 };
+    }
+}
+
+/// Adds the momenta of eight tethers to those of their roots.
+fn add_lanes(momenta: &TetherPulls, receivers: &[Option<u32>; 8], impulses: &mut [DVec3]) {
+    for (lane, receiver) in receivers.iter().enumerate() {
+        if let Some(receiver) = receiver {
+            let momentum = axes(|axis| f64::from(momenta[axis][lane]));
+            impulses[*receiver as usize] += DVec3::from_array(momentum);
+        }
     }
 }

@@ -2,12 +2,12 @@
 
 use glam::Vec3;
 
+use super::band_forces::TetherPulls;
 use super::row_layout::{RowLayout, TETHER_FIELDS};
 use crate::constraints::separation::RestLength;
 use crate::constraints::tether_pull::{Tethered, tether_excess};
 use crate::contacts::path::{LanePath, SubstepPath};
 use crate::kernels::lanes::{Lanes8, Wide, axes, lane_groups, lane_groups_mut};
-use crate::kernels::vectors::{divided, masked};
 use crate::step::particle_block::ParticleBlock;
 use crate::step::prediction::Prediction;
 use crate::store::layout::SceneFields;
@@ -22,9 +22,8 @@ pub(crate) struct SheetRow<'a> {
     /// For each tether of a particle: the position of the root at the end of the substep, the largest
     /// distance to it, and its square.
     tethers: &'a [f32],
-    /// For each tether of a particle and each axis: mass times the displacement that the tether has taken in this
-    /// step. Empty if nobody asks for it.
-    tether_pulls: &'a mut [Lanes8],
+    /// For each tether of a particle and eight columns: what it has taken in this step. Empty if nobody asks for it.
+    tether_pulls: &'a mut [TetherPulls],
     /// Length of a field in numbers.
     stride: usize,
     /// Index of the first particle.
@@ -37,7 +36,7 @@ impl<'a> SheetRow<'a> {
         numbers: &'a mut [f32],
         layout: &RowLayout,
         row: usize,
-        tether_pulls: &'a mut [Lanes8],
+        tether_pulls: &'a mut [TetherPulls],
     ) -> Self {
         let (stride, count) = (layout.stride, layout.columns.div_ceil(8));
         let mut numbers = numbers;
@@ -108,14 +107,11 @@ fn set_vector(axes: &mut [&mut [Lanes8]; 3], index: usize, vector: Vec3) {
     }
 }
 
-/// Adds the momentum that a tether has taken from eight particles to its sums, which are `stride` apart.
+/// Adds the displacements that tethers have taken from eight particles to their sums.
 #[inline(always)]
-fn add_pull<W: Wide>(sums: &mut [Lanes8], stride: usize, excess: [W; 3], inverse_mass: W) {
-    let is_free = W::splat(0.0).is_below(inverse_mass);
-    let pull = masked(divided(excess, inverse_mass), is_free);
-    for (axis, pull) in pull.into_iter().enumerate() {
-        let sum = &mut sums[axis * stride];
-        (W::load(sum, 0) + pull).store(sum, 0);
+fn add_pulls<W: Wide>(sums: &mut TetherPulls, excess: [W; 3]) {
+    for (sum, excess) in sums.iter_mut().zip(excess) {
+        (W::load(sum, 0) + excess).store(sum, 0);
     }
 }
 
@@ -212,8 +208,7 @@ impl ParticleBlock for SheetRow<'_> {
                     (before[axis] - excess[axis]).store(&mut self.d[axis][group], 0);
                 }
                 if !self.tether_pulls.is_empty() {
-                    let first = 3 * slot * count + group;
-                    add_pull(&mut self.tether_pulls[first..], count, excess, load(self.w));
+                    add_pulls(&mut self.tether_pulls[slot * count + group], excess);
                 }
             }
         }
