@@ -4,7 +4,7 @@
 use integration_tests::ctl;
 use serde_json::json;
 
-use crate::support::{Camera, Picture, Rig, distance, is_cloth, is_particle, is_pin};
+use crate::support::{Area, Camera, Picture, Rig, distance, is_cloth, is_particle, is_pin};
 
 /// A sheet that swings, because gravity is not parallel to it.
 pub(crate) const SWINGING: &str = "
@@ -152,6 +152,34 @@ fn fit_view_ignores_what_has_fallen_away_and_a_reset_restores_the_first_view() {
 
     rig.tab.key('r');
     rig.tab.wait(&format!("viewer.step > {} && {view} === {first}", state.step));
+}
+
+/// A sheet on a ball that reaches half a millimetre through it, as balls do between particles that rest on them.
+const ON_A_BALL: &str = "
+version = 1
+
+[[collider]]
+shape = \"sphere\"
+center = [0, 0.5005, 0]
+radius = 0.5
+
+[[generate]]
+shape = \"cloth\"
+columns = 5
+rows = 5
+spacing = 0.1
+origin = [-0.2, 1, -0.2]
+down = [0, 0, 1]
+pinned = \"none\"
+";
+
+#[test]
+#[ignore = "needs Chromium"]
+fn a_ball_does_not_show_through_the_cloth_on_it() {
+    let rig = Rig::with_scene(ON_A_BALL, &["--paused"], "camera=0,1,0,1.5,0.4,1.2");
+    let area = Area::around(rig.tab.camera().project([0.0, 1.0, 0.0]), 6.0);
+    let picture = rig.tab.drawn(area);
+    assert_eq!(picture.count(&area, is_cloth), picture.count(&area, |_| true));
 }
 
 #[test]

@@ -32,6 +32,8 @@ const ARROW_WIDTH = 3;
 const THREAD_SPACINGS = 0.25;
 /** Reach of shadows around the target of the camera, in distances from it: a little more than the picture shows. */
 const SHADOW_REACH = 1.2;
+/** Depth that solids are drawn behind their place: about 0.15 % of the distance. */
+const COLLIDER_BEHIND = { slopes: 1, units: 500 };
 /** Scenes with more particles than a ragdoll are drawn with thinner sticks. */
 const FEW_PARTICLES = 60;
 
@@ -365,7 +367,11 @@ export class Renderer {
     const { gl, simulation, drawables } = this;
     gl.enable(gl.DEPTH_TEST);
     gl.depthFunc(gl.LEQUAL);
+    // The triangles between particles that rest on a round solid cut into it a little.
+    gl.enable(gl.POLYGON_OFFSET_FILL);
+    gl.polygonOffset(COLLIDER_BEHIND.slopes, COLLIDER_BEHIND.units);
     this.colliders?.draw(uniforms);
+    gl.disable(gl.POLYGON_OFFSET_FILL);
     const { ground } = simulation;
     for (const one of simulation.colliders) {
       if (one.shape !== "plane" || (ground !== null && one.offset === ground.offset && dot(one.normal, ground.normal) > 0.999)) continue;
