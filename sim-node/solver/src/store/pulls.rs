@@ -36,7 +36,7 @@ pub(crate) struct Pulls {
 /// Indices of the first pull of a projection, and of the first one behind them.
 type PullRange = [u32; 2];
 
-/// What a projection changes at a free particle.
+/// Change of a free particle by a projection.
 #[derive(Debug, Clone, Copy)]
 struct Change {
     /// Where the x displacement is among the numbers of all.
