@@ -51,6 +51,8 @@ pub const COMMANDS_QUEUED_MAX: usize = 4096;
 pub const CONSTRAINTS_PER_CUT_MAX: usize = 256;
 /// Particles that one client grabs at a time: ten fingers and a few spare.
 pub const GRABS_PER_CLIENT_MAX: usize = 16;
+/// Particles that a page inspects at a time: a selection of a dozen constraints has two dozen ends.
+pub const PARTICLES_INSPECTED_MAX: usize = 32;
 /// Steps in one command.
 pub const STEPS_AT_ONCE_MAX: u32 = 10_000;
 /// Largest scene whose positions are sent as f32 to a page that leaves the choice to the server.

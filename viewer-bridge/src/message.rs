@@ -7,7 +7,7 @@ mod timeline;
 mod to_page;
 
 pub use check::check;
-pub use from_page::{Choice, Command, FromPage, Hello, Malformed};
+pub use from_page::{Choice, Command, FromPage, Hello, Malformed, Wish};
 pub use refusal::Refusal;
 pub use timeline::{Hashes, Mark, MarkKind, Playback, Timeline};
 pub use to_page::{

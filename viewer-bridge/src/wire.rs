@@ -10,6 +10,7 @@ mod forces;
 mod frame;
 mod header;
 mod scene;
+mod selected;
 mod small;
 mod statistics;
 mod writer;
@@ -22,5 +23,6 @@ pub use frame::{
 };
 pub use header::{KIND_VERSION, Kind, Stamp};
 pub use scene::{Scene, SceneText, ShapeText, scene_flag};
+pub use selected::{Inspected, InspectedParticle, Speeds};
 pub use small::{Colliders, FlaggedParticle, Pins, Tear};
 pub use statistics::{Percentiles, Statistics, statistics_flag};

@@ -11,7 +11,7 @@ use std::path::Path;
 use serde_json::{Value, json};
 use sim_contract::{
     ColliderShape, ColliderState, ConstraintState, ForceKind, ForceRow, ParameterValues,
-    ParticleFlags, ParticleState, Reason, Triangle,
+    ParticleFlags, ParticleState, Reason, TearCause, TornConstraint, Triangle,
 };
 use sim_solver::scene::ColliderMesh;
 use viewer_bridge::message::{
@@ -20,8 +20,9 @@ use viewer_bridge::message::{
 };
 use viewer_bridge::scene::catalog::Catalog;
 use viewer_bridge::wire::{
-    Bounds, Colliders, Forces, Format, FrameHead, FrameLimits, Message, Percentiles, Pins, Scene,
-    SceneText, ShapeText, Stamp, Statistics, Tear, decode, encode_frame, frame_flag, scene_flag,
+    Bounds, Colliders, Forces, Format, FrameHead, FrameLimits, Inspected, Message, Percentiles,
+    Pins, Scene, SceneText, ShapeText, Speeds, Stamp, Statistics, Tear, decode, encode_frame,
+    frame_flag, scene_flag,
 };
 
 const STAMP: Stamp = Stamp { epoch: 3, step: 1200 };
@@ -31,7 +32,7 @@ fn particles() -> Vec<ParticleState> {
     let at = |position, flags| ParticleState { position, flags, ..ParticleState::default() };
     vec![
         at([0.0, 1.0, -0.5], ParticleFlags::PINNED),
-        at([0.25, 0.5, 0.5], 0),
+        ParticleState { velocity: [3.0, 0.0, -4.0], inverse_mass: 2.0, ..at([0.25, 0.5, 0.5], 0) },
         at([1.0, 0.0, 0.125], ParticleFlags::GRABBED),
         at([f32::NAN, 0.0, 0.0], ParticleFlags::FROZEN),
     ]
@@ -53,9 +54,11 @@ fn scene() -> Scene {
         collider_meshes: [(2, triangle_mesh())].into(),
         ..Scene::default()
     };
-    let joins = |a, b, kind| ConstraintState { a, b, rest_length: 0.5, kind, compliance: 0.0 };
+    let joins =
+        |a, b, kind, compliance| ConstraintState { a, b, rest_length: 0.5, kind, compliance };
     let triangles = [Triangle { corners: [0, 1, 2] }, Triangle { corners: [1, 3, 2] }];
-    scene.set_geometry(&particles(), &[joins(0, 1, 0), joins(1, 2, 1), joins(2, 3, 2)], &triangles);
+    let constraints = [joins(0, 1, 0, 0.0), joins(1, 2, 1, 0.25), joins(2, 3, 2, 1e-3)];
+    scene.set_geometry(&particles(), &constraints, &triangles);
     scene
 }
 
@@ -151,6 +154,11 @@ fn forces() -> Forces {
     Forces { stamp: STAMP, rate_hz: 240, rows: vec![collider, anchor, pin] }
 }
 
+/// The second particle. The third is not one of the scene.
+fn inspected() -> Inspected {
+    Inspected::from_particles(STAMP, &particles()[..2], &[1, 2])
+}
+
 /// All binary messages, by name.
 fn messages() -> Vec<(&'static str, Vec<u8>)> {
     let finite = &particles()[..3];
@@ -160,7 +168,10 @@ fn messages() -> Vec<(&'static str, Vec<u8>)> {
     let frame = |format, particles: &[ParticleState]| {
         encode_frame(&head(), particles, format, &limits).to_vec()
     };
-    let tear = Tear { stamp: STAMP, first: 1, constraints: vec![7, 3, 9] };
+    let torn = |constraint, cause| TornConstraint { constraint, cause };
+    let torn =
+        vec![torn(7, TearCause::Cut as u32), torn(3, TearCause::Force as u32), torn(9, u32::MAX)];
+    let tear = Tear { stamp: STAMP, first: 1, torn };
     let nothing = Tear { stamp: STAMP, ..Tear::default() };
     let pins = Pins::from_particles(STAMP, &particles());
     vec![
@@ -177,6 +188,8 @@ fn messages() -> Vec<(&'static str, Vec<u8>)> {
         ("statistics", statistics().encode().to_vec()),
         ("colliders", colliders().encode().to_vec()),
         ("forces", forces().encode().to_vec()),
+        ("speeds", Speeds::from_particles(STAMP, &particles()).encode().to_vec()),
+        ("inspected", inspected().encode().to_vec()),
     ]
 }
 
@@ -189,7 +202,7 @@ fn fields(message: &Message) -> Value {
             "min": scene.bounds().min, "max": scene.bounds().max,
             "positions": scene.positions, "ends": scene.ends,
             "rest_lengths": scene.rest_lengths, "triangles": scene.triangles,
-            "kinds": scene.kinds, "text": scene.text,
+            "kinds": scene.kinds, "compliances": scene.compliances, "text": scene.text,
             "meshes": scene.collider_meshes.iter().map(|(collider, mesh)| json!({
                 "collider": collider, "vertices": mesh.vertices, "triangles": mesh.triangles,
             })).collect::<Vec<_>>(),
@@ -206,7 +219,9 @@ fn fields(message: &Message) -> Value {
         }),
         Message::Tear(tear) => json!({
             "kind": 4, "epoch": tear.stamp.epoch, "step": tear.stamp.step,
-            "first": tear.first, "constraints": tear.constraints,
+            "first": tear.first,
+            "constraints": tear.constraints(),
+            "causes": tear.torn.iter().map(|torn| torn.cause).collect::<Vec<_>>(),
         }),
         Message::Pins(pins) => json!({
             "kind": 5, "epoch": pins.stamp.epoch, "step": pins.stamp.step,
@@ -238,14 +253,31 @@ fn fields(message: &Message) -> Value {
                 "velocity": one.velocity, "angular_velocity": one.angular_velocity,
             })).collect::<Vec<_>>(),
         }),
+        wish => wished_fields(wish),
+    }
+}
+
+/// The fields of a message that a page asks for.
+fn wished_fields(message: &Message) -> Value {
+    match message {
         Message::Forces(all) => json!({
-            "kind": 8, "epoch": all.stamp.epoch, "step": all.stamp.step,
-            "rate_hz": all.rate_hz,
+            "kind": 8, "epoch": all.stamp.epoch, "step": all.stamp.step, "rate_hz": all.rate_hz,
             "rows": all.rows.iter().map(|row| json!({
                 "kind": row.kind, "index": row.index, "impulse": row.impulse,
                 "angular_impulse": row.angular_impulse, "contacts": row.contacts,
             })).collect::<Vec<_>>(),
         }),
+        Message::Speeds(all) => json!({
+            "kind": 9, "epoch": all.stamp.epoch, "step": all.stamp.step, "speeds": all.speeds,
+        }),
+        Message::Inspected(all) => json!({
+            "kind": 10, "epoch": all.stamp.epoch, "step": all.stamp.step,
+            "particles": all.particles.iter().map(|one| json!({
+                "particle": one.particle, "position": one.position, "velocity": one.velocity,
+                "inverse_mass": one.inverse_mass,
+            })).collect::<Vec<_>>(),
+        }),
+        other => panic!("{other:?}"),
     }
 }
 
@@ -282,6 +314,7 @@ fn every_message_decodes_to_what_was_encoded() {
     assert_eq!(decode(&scene().encode()), Ok(Message::Scene(scene())));
     assert_eq!(decode(&colliders().encode()), Ok(Message::Colliders(colliders())));
     assert_eq!(decode(&forces().encode()), Ok(Message::Forces(forces())));
+    assert_eq!(decode(&inspected().encode()), Ok(Message::Inspected(inspected())));
     let decoded = decode(&statistics().encode());
     assert_eq!(decoded, Ok(Message::Statistics(Box::new(statistics()))));
     for (name, bytes) in messages() {
@@ -416,11 +449,13 @@ fn to_page_of_a_replay() -> Vec<ToPage> {
 }
 
 /// One message of each kind that a page may send.
-const FROM_PAGE: [&str; 27] = [
+const FROM_PAGE: [&str; 29] = [
     r#"{"type":"hello","protocol":2,"token":"00","format":"u16"}"#,
     r#"{"type":"hello","protocol":2}"#,
     r#"{"type":"ack","frame":77}"#,
     r#"{"type":"forces","is_on":true}"#,
+    r#"{"type":"speeds","is_on":true}"#,
+    r#"{"type":"inspect","particles":[0,7]}"#,
     r#"{"type":"grab","particle":90,"target":[0.5,0.2,0.3],"over_s":0.05,"id":1}"#,
     r#"{"type":"move","particle":90,"target":[0.5,0.4,0.3]}"#,
     r#"{"type":"release","particle":90}"#,

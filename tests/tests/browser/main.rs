@@ -9,9 +9,11 @@
 )]
 
 mod access;
+mod colours;
 mod effects;
 mod first_minute;
 mod forces;
+mod inspector;
 mod pages;
 mod picture;
 mod pointer;

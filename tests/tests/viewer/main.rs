@@ -134,7 +134,7 @@ fn pages_can_pin_cut_brush_set_step_reset_and_load() {
     let outcome = page.command(cut.clone());
     assert_eq!((&outcome["applied"], &outcome["rejected"]), (&json!(3), &json!(0)));
     let tear = page.tear();
-    assert_eq!((tear.first, tear.constraints), (0, vec![300, 301, 302]));
+    assert_eq!((tear.first, tear.constraints()), (0, vec![300, 301, 302]));
     assert_eq!(page.rejected(cut), "already_torn");
     let stale = json!({ "type": "cut", "epoch": epoch + 1, "constraints": [1] });
     assert_eq!(page.rejected(stale), "stale_epoch");
@@ -161,7 +161,7 @@ fn pages_can_pin_cut_brush_set_step_reset_and_load() {
     page.applied(json!({ "type": "resume" }));
     let reset = page.applied(json!({ "type": "reset" }));
     let tear = page.tear();
-    assert!(tear.constraints.is_empty() && tear.first == 0 && tear.stamp.step >= reset);
+    assert!(tear.torn.is_empty() && tear.first == 0 && tear.stamp.step >= reset);
     check_refusals(&mut page);
     page.send(&json!({ "type": "load", "scene": "rope" }));
     let rope = page.scene();

@@ -100,7 +100,7 @@ impl View {
         page.receive("a step", |message| match message {
             Message::Tear(tear) => {
                 torn.truncate(tear.first as usize);
-                torn.extend(tear.constraints);
+                torn.extend(tear.constraints());
                 None
             }
             Message::Pins(message) => {

@@ -6,6 +6,8 @@ use serde_json::{Map, Value};
 use sim_contract::{GRAB_OVER_S_DEFAULT, KindFilter, ParameterValue};
 use thiserror::Error;
 
+use crate::limits::PARTICLES_INSPECTED_MAX;
+
 /// A message from a page.
 #[derive(Debug, Clone, PartialEq)]
 pub enum FromPage {
@@ -16,11 +18,8 @@ pub enum FromPage {
         /// Number of the frame.
         frame: u32,
     },
-    /// The page wants the forces of each frame, or no longer.
-    Forces {
-        /// `true` if it wants them.
-        is_on: bool,
-    },
+    /// The page wants to know more, or less, of each frame.
+    Wish(Wish),
     /// A command.
     Command {
         /// The page's number for the command. A command with a number is always answered.
@@ -42,6 +41,27 @@ pub struct Hello {
     /// Format in which the page wants positions.
     #[serde(default)]
     pub format: Choice,
+}
+
+/// What a page wants to know of each frame besides the positions, from now on.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
+pub enum Wish {
+    /// The forces of the step, or no longer.
+    Forces {
+        /// `true` if it wants them.
+        is_on: bool,
+    },
+    /// The speeds of all particles, or no longer.
+    Speeds {
+        /// `true` if it wants them.
+        is_on: bool,
+    },
+    /// The exact states of these particles, and of no others.
+    Inspect {
+        /// Indices; at most [`PARTICLES_INSPECTED_MAX`].
+        particles: Vec<u32>,
+    },
 }
 
 /// Format of positions.
@@ -208,12 +228,6 @@ struct Ack {
     frame: u32,
 }
 
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct ForcesWish {
-    is_on: bool,
-}
-
 impl FromPage {
     /// Decodes a message from the bytes of a text.
     ///
@@ -234,7 +248,7 @@ impl FromPage {
         match fields.get("type").and_then(Value::as_str) {
             Some("hello") => untagged(fields).map(Self::Hello),
             Some("ack") => untagged(fields).map(|Ack { frame }| Self::Ack { frame }),
-            Some("forces") => untagged(fields).map(|ForcesWish { is_on }| Self::Forces { is_on }),
+            Some("forces" | "speeds" | "inspect") => read_wish(fields).map(Self::Wish),
             _ => {
                 let id = fields.remove("id").map(from_value).transpose()?;
                 Ok(Self::Command { id, command: from_value(Value::Object(fields))? })
@@ -246,6 +260,19 @@ impl FromPage {
 fn untagged<T: DeserializeOwned>(mut fields: Map<String, Value>) -> Result<T, Malformed> {
     fields.remove("type");
     from_value(Value::Object(fields))
+}
+
+fn read_wish(fields: Map<String, Value>) -> Result<Wish, Malformed> {
+    let wish = from_value(Value::Object(fields))?;
+    match &wish {
+        Wish::Inspect { particles } if particles.len() > PARTICLES_INSPECTED_MAX => {
+            let count = particles.len();
+            Err(Malformed(format!(
+                "inspect names {count} particles; the limit is {PARTICLES_INSPECTED_MAX}"
+            )))
+        }
+        _ => Ok(wish),
+    }
 }
 
 fn read<T: DeserializeOwned>(text: &str) -> Result<T, Malformed> {
@@ -279,6 +306,10 @@ mod tests {
             r#"{"type":"ack","frame":1,"id":1}"#,
             r#"{"type":"forces"}"#,
             r#"{"type":"forces","is_on":1}"#,
+            r#"{"type":"speeds"}"#,
+            r#"{"type":"inspect"}"#,
+            r#"{"type":"inspect","particles":[-1]}"#,
+            r#"{"type":"inspect","particles":[0,1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20,21,22,23,24,25,26,27,28,29,30,31,32]}"#,
             r#"{"type":"hello"}"#,
             r#"{"type":"hello","protocol":1,"colour":2}"#,
             r#"{"type":"hello","protocol":1,"format":"f64"}"#,

@@ -94,6 +94,7 @@ pub struct PageLimits {
     pub frames_unacknowledged: u32,
     pub constraints_per_cut: usize,
     pub grabs_per_client: usize,
+    pub particles_inspected: usize,
     pub steps_at_once: u32,
     pub frames_per_second: u32,
 }
@@ -107,6 +108,7 @@ impl Default for PageLimits {
             frames_unacknowledged: limits::FRAMES_UNACKNOWLEDGED_MAX,
             constraints_per_cut: limits::CONSTRAINTS_PER_CUT_MAX,
             grabs_per_client: limits::GRABS_PER_CLIENT_MAX,
+            particles_inspected: limits::PARTICLES_INSPECTED_MAX,
             steps_at_once: limits::STEPS_AT_ONCE_MAX,
             frames_per_second: limits::FRAMES_PER_SECOND_MAX,
         }

@@ -1,8 +1,8 @@
 //! A page, seen from the task that serves it.
 
 use std::collections::VecDeque;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use axum::extract::ws::Message;
 use bytes::Bytes;
@@ -29,6 +29,17 @@ impl Credit {
     }
 }
 
+/// What a page has asked for besides the positions.
+#[derive(Debug, Default)]
+pub(crate) struct Wishes {
+    /// The forces of each step.
+    pub(crate) forces: bool,
+    /// The speeds of all particles.
+    pub(crate) speeds: bool,
+    /// The exact states of these particles.
+    pub(crate) particles: Vec<u32>,
+}
+
 /// A page that has joined.
 #[derive(Debug)]
 pub(crate) struct Connection {
@@ -38,8 +49,7 @@ pub(crate) struct Connection {
     pub(crate) queue: mpsc::Receiver<Message>,
     pub(crate) frames: watch::Receiver<Arc<FrameSet>>,
     pub(super) credit: Arc<Credit>,
-    /// The page has asked for forces.
-    pub(super) wants_forces: Arc<AtomicBool>,
+    pub(super) wishes: Arc<Mutex<Wishes>>,
     pub(super) sent: SentFrames,
 }
 
@@ -57,7 +67,7 @@ pub(super) struct SentFrames {
 /// Messages for a page that show the newest frame.
 #[derive(Debug)]
 pub(crate) enum NextFrame {
-    /// The frame, after the colliders if they have changed, and the forces if the page wants them.
+    /// The frame, after the colliders if they have changed, and what else the page wants.
     Frame(Vec<Bytes>),
     /// The page has received it before.
     Nothing,
@@ -82,31 +92,39 @@ impl Connection {
             Format::F32 => &frame.f32,
             Format::U16 => &frame.u16,
         };
+        let wished = self.wished(&frame);
         let sent = &mut self.sent;
         if sent.newest == Some(frame.number) || (frame.f32.is_none() && frame.u16.is_none()) {
             return NextFrame::Nothing;
         }
         sent.newest = Some(frame.number);
         let Some(encoded) = encoded else { return NextFrame::Missed };
-        let mut messages = Vec::with_capacity(3);
+        let mut messages = Vec::with_capacity(5);
         if let Some(colliders) = &frame.colliders
             && sent.colliders != Some(colliders.number)
         {
             sent.colliders = Some(colliders.number);
             messages.push(colliders.bytes.clone());
         }
-        if self.wants_forces.load(Ordering::Relaxed) {
-            messages.extend(frame.forces.clone());
-        }
+        messages.extend(wished);
         messages.push(encoded.clone());
         sent.unacknowledged.push_back(frame.number);
         self.credit.set_used(sent.unacknowledged.len());
         NextFrame::Frame(messages)
     }
 
-    /// Notes that the page wants forces, or no longer.
-    pub(crate) fn set_wants_forces(&self, is_on: bool) {
-        self.wants_forces.store(is_on, Ordering::Relaxed);
+    /// Returns the messages of a frame that the page has asked for.
+    fn wished(&self, frame: &FrameSet) -> impl Iterator<Item = Bytes> + use<> {
+        let wishes = self.wishes.lock().unwrap_or_else(PoisonError::into_inner);
+        let forces = frame.forces.clone().filter(|_| wishes.forces);
+        let speeds = frame.speeds.clone().filter(|_| wishes.speeds);
+        let inspected = frame.inspected.clone().filter(|_| !wishes.particles.is_empty());
+        [forces, speeds, inspected].into_iter().flatten()
+    }
+
+    /// Changes the wishes of the page.
+    pub(crate) fn with_wishes(&self, change: impl FnOnce(&mut Wishes)) {
+        change(&mut self.wishes.lock().unwrap_or_else(PoisonError::into_inner));
     }
 
     /// Notes that the page has drawn a frame.

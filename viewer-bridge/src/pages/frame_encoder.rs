@@ -6,7 +6,18 @@ use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use super::frame_set::{ColliderSet, Formats, FrameSet};
 use crate::sink::State;
 use crate::wire::convert::{microseconds, to_f32};
-use crate::wire::{Colliders, Forces, Format, FrameHead, FrameLimits, Scene, Stamp, encode_frame};
+use crate::wire::{
+    Colliders, Forces, Format, FrameHead, FrameLimits, Inspected, Scene, Speeds, Stamp,
+    encode_frame,
+};
+
+/// What pages want to know of a state besides the positions.
+#[derive(Debug, Default)]
+pub(super) struct Wanted {
+    pub(super) speeds: bool,
+    /// Particles whose exact states a page wants, ascending.
+    pub(super) particles: Vec<u32>,
+}
 
 /// Encodes states for the pages.
 #[derive(Debug, Default)]
@@ -46,7 +57,12 @@ impl FrameEncoder {
         self.colliders = Some(ColliderSet { number, bytes });
     }
 
-    pub(super) fn encode(&mut self, state: &State<'_>, formats: Formats) -> FrameSet {
+    pub(super) fn encode(
+        &mut self,
+        state: &State<'_>,
+        formats: Formats,
+        wanted: &Wanted,
+    ) -> FrameSet {
         let begin_ns = monotonic_ns();
         self.last_number = self.last_number.wrapping_add(1);
         let head = FrameHead {
@@ -67,6 +83,12 @@ impl FrameEncoder {
             u16: formats.u16.then(|| encode(Format::U16)),
             colliders: self.colliders.clone(),
             forces: state.forces.map(|forces| encode_forces(head.stamp, forces)),
+            speeds: wanted
+                .speeds
+                .then(|| Speeds::from_particles(head.stamp, state.particles).encode()),
+            inspected: (!wanted.particles.is_empty()).then(|| {
+                Inspected::from_particles(head.stamp, state.particles, &wanted.particles).encode()
+            }),
         };
         self.cost.encode_ns += monotonic_ns().saturating_sub(begin_ns);
         self.cost.frame_count += 1;

@@ -21,6 +21,10 @@ pub(crate) struct FrameSet {
     pub(crate) colliders: Option<ColliderSet>,
     /// FORCES of the same step, if they were read.
     pub(crate) forces: Option<Bytes>,
+    /// SPEEDS of the same step, if a page wants them.
+    pub(crate) speeds: Option<Bytes>,
+    /// INSPECTED of the same step, with the particles that any page wants.
+    pub(crate) inspected: Option<Bytes>,
 }
 
 /// The colliders of a state.

@@ -6,15 +6,14 @@
 //! empties its queue before it sends a frame. Therefore no frame arrives before its scene.
 
 use std::collections::BTreeMap;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use axum::extract::ws::Message;
 use bytes::Bytes;
 use tokio::sync::{mpsc, watch};
 
-use super::connection::{Connection, Credit, SentFrames};
-use super::frame_encoder::FrameEncoder;
+use super::connection::{Connection, Credit, SentFrames, Wishes};
+use super::frame_encoder::{FrameEncoder, Wanted};
 pub use super::frame_set::Formats;
 use super::frame_set::{FrameSet, format_for};
 use crate::limits::{PROTOCOL, RELIABLE_QUEUED_MAX};
@@ -64,7 +63,7 @@ struct Page {
     queue: mpsc::Sender<Message>,
     choice: Choice,
     credit: Arc<Credit>,
-    wants_forces: Arc<AtomicBool>,
+    wishes: Arc<Mutex<Wishes>>,
 }
 
 impl HubState {
@@ -91,7 +90,7 @@ impl HubState {
 
 /// A panic in one task must not stop the others. Every change under this lock is complete wherever a
 /// panic could occur.
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -121,6 +120,19 @@ impl Hub {
         formats
     }
 
+    /// Returns what pages want to know of a state besides the positions.
+    fn wanted(&self) -> Wanted {
+        let mut wanted = Wanted::default();
+        for page in lock(&self.state).pages.values() {
+            let wishes = lock(&page.wishes);
+            wanted.speeds |= wishes.speeds;
+            wanted.particles.extend(&wishes.particles);
+        }
+        wanted.particles.sort_unstable();
+        wanted.particles.dedup();
+        wanted
+    }
+
     /// Number of pages.
     pub fn client_count(&self) -> usize {
         lock(&self.state).pages.len()
@@ -141,8 +153,7 @@ impl Hub {
     /// Sends the change of the list to the pages, and keeps the whole list for later ones.
     fn publish_torn(&self, Torn { stamp, all, known_count }: &Torn<'_>) {
         let tear = |first: usize| {
-            let constraints = all[first..].iter().map(|torn| torn.constraint).collect();
-            let tear = Tear { stamp: *stamp, first: count_u32(first), constraints };
+            let tear = Tear { stamp: *stamp, first: count_u32(first), torn: all[first..].to_vec() };
             Message::Binary(tear.encode())
         };
         let mut state = lock(&self.state);
@@ -189,9 +200,9 @@ impl Hub {
             // The queue has room for all of them.
             let _queued = queue.try_send(message.clone());
         }
-        let wants_forces = Arc::new(AtomicBool::new(false));
-        let (seen_credit, seen_wish) = (Arc::clone(&credit), Arc::clone(&wants_forces));
-        let page = Page { queue, choice, credit: seen_credit, wants_forces: seen_wish };
+        let wishes = Arc::new(Mutex::new(Wishes::default()));
+        let (seen_credit, seen_wishes) = (Arc::clone(&credit), Arc::clone(&wishes));
+        let page = Page { queue, choice, credit: seen_credit, wishes: seen_wishes };
         state.pages.insert(client, page);
         state.queue_count();
         drop(state);
@@ -199,7 +210,7 @@ impl Hub {
         frames.mark_unchanged();
         self.request(client, RequestKind::State);
         let sent = SentFrames::default();
-        Connection { client, choice, queue: receiver, frames, credit, wants_forces, sent }
+        Connection { client, choice, queue: receiver, frames, credit, wishes, sent }
     }
 
     fn welcome(&self, client: u32, format: Choice) -> Welcome {
@@ -241,8 +252,7 @@ impl Sink for Hub {
             Demand::State => lock(&self.state).pages.values().any(|page| page.credit.is_left()),
             Demand::Statistics => self.client_count() > 0,
             Demand::Forces => {
-                let wants = |page: &Page| page.wants_forces.load(Ordering::Relaxed);
-                lock(&self.state).pages.values().any(wants)
+                lock(&self.state).pages.values().any(|page| lock(&page.wishes).forces)
             }
         }
     }
@@ -263,7 +273,8 @@ impl Sink for Hub {
             Update::State(state) => {
                 let formats = self.awaited_formats(state.particles.len());
                 if formats.is_any() {
-                    let frame = lock(&self.encoder).encode(&state, formats);
+                    let wanted = self.wanted();
+                    let frame = lock(&self.encoder).encode(&state, formats, &wanted);
                     self.frames.send_replace(Arc::new(frame));
                 }
             }

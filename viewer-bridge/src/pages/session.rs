@@ -9,7 +9,7 @@ use tokio::time::timeout;
 use super::connection::{Acknowledged, Connection, NextFrame};
 use super::hub::Hub;
 use crate::limits::{HELLO_TIMEOUT, PROTOCOL};
-use crate::message::{Command, FromPage, Hello, OutcomeText, Refusal, ToPage, check};
+use crate::message::{Command, FromPage, Hello, OutcomeText, Refusal, ToPage, Wish, check};
 use crate::request::{ClientId, RequestKind};
 use crate::shutdown::Shutdown;
 use crate::socket::guard::Guard;
@@ -164,9 +164,13 @@ fn accept(message: &Message, hub: &Hub, connection: &mut Connection) -> Result<(
                 hub.request(connection.client, RequestKind::Credit);
             }
         }
-        FromPage::Forces { is_on } => {
-            connection.set_wants_forces(is_on);
-            // The state on show can have forces that this page has not received.
+        FromPage::Wish(wish) => {
+            connection.with_wishes(|wishes| match wish {
+                Wish::Forces { is_on } => wishes.forces = is_on,
+                Wish::Speeds { is_on } => wishes.speeds = is_on,
+                Wish::Inspect { particles } => wishes.particles = particles,
+            });
+            // The page has not received this part of the state on show.
             hub.request(connection.client, RequestKind::State);
         }
         FromPage::Command { id, command } => submit(hub, connection.client, id, command),

@@ -6,6 +6,7 @@ use super::forces::Forces;
 use super::frame::{self, Format, Frame};
 use super::header::{KIND_VERSION, Kind, Stamp};
 use super::scene::Scene;
+use super::selected::{Inspected, Speeds};
 use super::small::{Colliders, Pins, Tear};
 use super::statistics::Statistics;
 
@@ -26,6 +27,10 @@ pub enum Message {
     Colliders(Colliders),
     /// The impulses of a step.
     Forces(Forces),
+    /// The speeds of all particles.
+    Speeds(Speeds),
+    /// The exact states of some particles.
+    Inspected(Inspected),
 }
 
 /// Decodes one message.
@@ -57,6 +62,10 @@ pub fn decode(bytes: &[u8]) -> Result<Message, DecodeError> {
         Message::Colliders(Colliders::decode(stamp, &mut cursor)?)
     } else if is(Kind::Forces) {
         Message::Forces(Forces::decode(stamp, &mut cursor)?)
+    } else if is(Kind::Speeds) {
+        Message::Speeds(Speeds::decode(stamp, &mut cursor)?)
+    } else if is(Kind::Inspected) {
+        Message::Inspected(Inspected::decode(stamp, &mut cursor)?)
     } else {
         return Err(unknown);
     };

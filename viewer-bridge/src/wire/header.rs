@@ -23,6 +23,10 @@ pub enum Kind {
     Colliders = 7,
     /// The impulses of a step.
     Forces = 8,
+    /// The speeds of all particles.
+    Speeds = 9,
+    /// The exact states of some particles.
+    Inspected = 10,
 }
 
 /// Load and step that a message belongs to.

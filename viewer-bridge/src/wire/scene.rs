@@ -38,6 +38,8 @@ pub struct Scene {
     pub triangles: Vec<[u32; 3]>,
     /// Kinds of the constraints.
     pub kinds: Vec<u8>,
+    /// Compliances of the constraints; their stiffness in a scene of the method pbd.
+    pub compliances: Vec<f32>,
     /// Names.
     pub text: SceneText,
     /// Triangles of the colliders that are meshes.
@@ -82,6 +84,7 @@ impl Scene {
         self.positions = particles.iter().map(|one| one.position.map(finite)).collect();
         self.ends = constraints.iter().map(|one| [one.a, one.b]).collect();
         self.rest_lengths = constraints.iter().map(|one| one.rest_length).collect();
+        self.compliances = constraints.iter().map(|one| one.compliance).collect();
         self.kinds =
             constraints.iter().map(|one| u8::try_from(one.kind).unwrap_or(u8::MAX)).collect();
         self.triangles = triangles.iter().map(|one| one.corners).collect();
@@ -101,7 +104,7 @@ impl Scene {
         let json = serde_json::to_vec(&self.text).expect("strings have a JSON form");
         let size = 100
             + 12 * self.positions.len()
-            + 13 * self.ends.len()
+            + 17 * self.ends.len()
             + 12 * self.triangles.len()
             + json.len()
             + self.collider_meshes.values().map(mesh_size_bytes).sum::<usize>();
@@ -132,6 +135,7 @@ impl Scene {
             mesh.vertices.iter().for_each(|vertex| writer.vector(*vertex));
             mesh.triangles.iter().flatten().for_each(|corner| writer.u32(*corner));
         }
+        self.compliances.iter().for_each(|compliance| writer.f32(*compliance));
         writer.finish()
     }
 
@@ -155,6 +159,7 @@ impl Scene {
             text: serde_json::from_slice(&cursor.padded(json_size)?)
                 .map_err(|error| DecodeError::Json { detail: error.to_string() })?,
             collider_meshes: decode_meshes(cursor)?,
+            compliances: cursor.list(constraints, 4, Cursor::f32)?,
         })
     }
 }

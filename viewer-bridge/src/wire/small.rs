@@ -2,7 +2,7 @@
 
 use bytemuck::bytes_of;
 use bytes::Bytes;
-use sim_contract::{ColliderState, ParticleState};
+use sim_contract::{ColliderState, ParticleState, TornConstraint};
 
 use super::cursor::Cursor;
 use super::decode_error::DecodeError;
@@ -16,24 +16,43 @@ pub struct Tear {
     pub stamp: Stamp,
     /// Number of entries to keep.
     pub first: u32,
-    /// Constraints after them.
-    pub constraints: Vec<u32>,
+    /// Constraints after them, with their causes.
+    pub torn: Vec<TornConstraint>,
 }
 
 impl Tear {
     /// Encodes the message.
     pub fn encode(&self) -> Bytes {
-        let mut writer = Writer::new(Kind::Tear, self.stamp, 24 + 4 * self.constraints.len());
+        let mut writer = Writer::new(Kind::Tear, self.stamp, 27 + 5 * self.torn.len());
         writer.u32(self.first);
-        writer.count(&self.constraints);
-        self.constraints.iter().for_each(|constraint| writer.u32(*constraint));
+        writer.count(&self.torn);
+        self.torn.iter().for_each(|torn| writer.u32(torn.constraint));
+        self.torn.iter().for_each(|torn| writer.bytes(&[cause_byte(torn.cause)]));
+        writer.pad();
         writer.finish()
+    }
+
+    /// The constraints after the kept entries, without their causes.
+    pub fn constraints(&self) -> Vec<u32> {
+        self.torn.iter().map(|torn| torn.constraint).collect()
     }
 
     pub(super) fn decode(stamp: Stamp, cursor: &mut Cursor<'_>) -> Result<Self, DecodeError> {
         let (first, count) = (cursor.u32()?, cursor.u32()?);
-        Ok(Self { stamp, first, constraints: cursor.list(count, 4, Cursor::u32)? })
+        let constraints = cursor.list(count, 4, Cursor::u32)?;
+        let causes = cursor.padded(count)?;
+        let torn = constraints.into_iter().zip(causes);
+        let torn = torn.map(|(constraint, cause)| TornConstraint {
+            constraint,
+            cause: if cause == u8::MAX { u32::MAX } else { cause.into() },
+        });
+        Ok(Self { stamp, first, torn: torn.collect() })
     }
+}
+
+/// A cause as a byte; 255 where it is unknown.
+fn cause_byte(cause: u32) -> u8 {
+    u8::try_from(cause).unwrap_or(u8::MAX)
 }
 
 /// All particles that are not free.

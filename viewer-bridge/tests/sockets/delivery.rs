@@ -40,7 +40,7 @@ fn a_late_page_receives_the_state_in_order() {
     let Message::Scene(scene) = page.binary() else { panic!("no scene") };
     assert_eq!((scene.stamp.epoch, scene.positions.len()), (1, 2));
     let Message::Tear(tear) = page.binary() else { panic!("no tear") };
-    assert_eq!((tear.first, tear.constraints), (0, vec![3, 1, 2]));
+    assert_eq!((tear.first, tear.constraints()), (0, vec![3, 1, 2]));
     assert_eq!(page.text_with_type("clients")["count"], 1);
 }
 
@@ -56,7 +56,7 @@ fn tears_come_as_changes_and_a_reset_empties_the_list() {
     let mut tears = Vec::new();
     while tears.len() < 4 {
         if let Message::Tear(tear) = page.binary() {
-            tears.push((tear.stamp.step, tear.first, tear.constraints));
+            tears.push((tear.stamp.step, tear.first, tear.constraints()));
         }
     }
     let expected = [(5, 0, vec![3]), (6, 1, vec![1]), (7, 0, vec![]), (8, 0, vec![2])];

@@ -3,6 +3,7 @@
 import { Banner, sentence } from "./ui/banner.js";
 import { Camera } from "./geometry/camera.js";
 import { Charts } from "./panel/charts.js";
+import { ColorLegend } from "./ui/color-legend.js";
 import { Commands } from "./net/commands.js";
 import { Controls } from "./ui/controls.js";
 import { find } from "./ui/dom.js";
@@ -13,12 +14,15 @@ import { Input } from "./tools/input.js";
 import { Hint, Question } from "./ui/prompts.js";
 import { parseLink } from "./ui/link.js";
 import { Overlay } from "./ui/overlay.js";
+import { Inspector } from "./panel/inspector.js";
 import { Panel } from "./panel/panel.js";
 import { Connector } from "./net/socket.js";
+import { Selection } from "./state/selection.js";
 import { Simulation } from "./state/simulation.js";
 import { TimelineBar } from "./ui/timeline-bar.js";
 import { createViewer } from "./viewer.js";
 import { Views } from "./ui/views.js";
+import { Wishes } from "./state/wishes.js";
 
 /** Key of the token in sessionStorage, so that it survives a reload. */
 const TOKEN_KEY = "catenary-token";
@@ -84,16 +88,26 @@ function start(renderer) {
   const commands = new Commands((message) => connector.send(message), (outcome) => {
     if (!QUIET_REASONS.has(outcome.reason)) banner.notify(`${outcome.kind}: ${outcome.text || outcome.reason}`, "warning");
   });
-  const app = { simulation, camera, renderer, commands };
+  const app = { simulation, camera, renderer, commands, selection: new Selection(simulation) };
   const input = new Input(renderer.canvas, app, () => controls.canChange());
   const overlay = new Overlay(find("overlay", HTMLCanvasElement), app, input);
   const views = new Views(app, banner);
   const timeline = new TimelineBar(simulation, commands);
   const controls = new Controls(app, input, views, timeline, banner);
   const panel = new Panel(find("parameters", HTMLFormElement), find("parameters-note", HTMLElement), app, banner);
-  new Charts(find("plots", HTMLElement), find("figures", HTMLElement), simulation);
+  const inspector = new Inspector(app, input, banner);
+  controls.onInspect = () => inspector.turn();
+  controls.onFollow = () => inspector.toggleFollow();
+  const charts = new Charts(app, banner);
   new Hint(app, input);
   const forceLegend = new ForceLegend(app);
+  const colorLegend = new ColorLegend(app);
+  colorLegend.choose(link.colour);
+  const wishes = new Wishes(simulation, commands, {
+    forces: () => renderer.toggles.forces || inspector.wantsForces(),
+    speeds: () => renderer.toggles.heat && renderer.coloring.quantity === "speed",
+    inspected: () => app.selection.particles,
+  });
   const hud = new Hud(find("hud", HTMLOutputElement), simulation, renderer);
 
   listenToSimulation(input);
@@ -106,8 +120,12 @@ function start(renderer) {
     const begin = performance.now();
     input.tick(nowMs);
     panel.tick();
+    inspector.tick(nowMs);
+    charts.tick();
     hud.tick(nowMs);
+    colorLegend.tick(nowMs);
     forceLegend.tick();
+    wishes.tick();
     renderer.resize();
     const between = performance.now();
     if (renderer.isDirty) renderer.draw();
@@ -120,7 +138,7 @@ function start(renderer) {
   requestAnimationFrame(loop);
   connector.connect();
 
-  Object.defineProperty(window, "viewer", { value: createViewer({ app, connector, banner, input, faults, scriptMs: () => scriptMs }) });
+  Object.defineProperty(window, "viewer", { value: createViewer({ app, connector, colorLegend, charts, banner, input, faults, scriptMs: () => scriptMs }) });
 }
 
 /** @param {Input} input */

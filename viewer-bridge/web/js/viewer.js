@@ -1,15 +1,17 @@
 // `window.viewer`, the interface of the page for tests. It is read-only, but can draw on demand.
 
+import { inspectItem } from "./state/inspection.js";
+
 /**
  * @typedef {{
- *   app: import("./tools/tool.js").App, connector: import("./net/socket.js").Connector,
+ *   app: import("./tools/tool.js").App, colorLegend: import("./ui/color-legend.js").ColorLegend, charts: import("./panel/charts.js").Charts, connector: import("./net/socket.js").Connector,
  *   banner: import("./ui/banner.js").Banner, input: import("./tools/input.js").Input, faults: string[],
  *   scriptMs: () => number,
  * }} Parts
  */
 
 /** @param {Parts} parts */
-export function createViewer({ app, connector, banner, input, faults, scriptMs }) {
+export function createViewer({ app, colorLegend, charts, connector, banner, input, faults, scriptMs }) {
   const { simulation, camera, renderer, commands } = app;
   const viewer = {
     /** Step of the drawn picture, or -1 before the first. */
@@ -28,13 +30,20 @@ export function createViewer({ app, connector, banner, input, faults, scriptMs }
     get torn() { return simulation.torn.length; },
     /** Particles that are pinned, grabbed, anchored or frozen, with their flags. */
     get pins() { return [...simulation.pins]; },
-    get grabbed() { return input.tool !== null && "particle" in input.tool ? input.tool.particle : null; },
+    get grabbed() { return input.grabbed; },
+    /** The selected items, with what is known of each. */
+    get selected() { return app.selection.items.map((item) => ({ ...inspectItem(simulation, item), ...item })); },
     get pointerMode() { return input.mode; },
     get toggles() { return { ...renderer.toggles }; },
     /** The drawn force arrows, in N, and their length per newton. */
     get arrows() { return renderer.arrowsDrawn.map(({ from, force, ...which }) => ({ ...which, from: [...from], force: [...force] })); },
     get unitsPerNewton() { return renderer.unitsPerNewton(); },
-    get heatMax() { return renderer.heatMax; },
+    /** What the colours show, the ends of the scale, and the extremes once they are known. */
+    get coloring() { return { ...renderer.coloring, ...colorLegend.scan.found }; },
+    /** The plots in their order, with what each says now. */
+    get plots() { return charts.plots.map(({ spec, output }) => ({ title: spec.title, text: output.textContent })); },
+    get plotCursor() { return charts.cursor; },
+    get csv() { return charts.csv(); },
     get renderer() { return renderer.rendererName; },
     get banner() { return banner.text; },
     get notices() { return [...banner.history]; },

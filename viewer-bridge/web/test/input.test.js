@@ -5,6 +5,7 @@ import { test } from "node:test";
 import { Camera } from "../js/geometry/camera.js";
 import { Commands } from "../js/net/commands.js";
 import { Simulation } from "../js/state/simulation.js";
+import { Selection } from "../js/state/selection.js";
 import { Input } from "../js/tools/input.js";
 
 const VIEWPORT = { width: 800, height: 600 };
@@ -17,6 +18,14 @@ const FRAME = { kind: "frame", epoch: 1, step: 1, particleCount: 1, lo: [0, 0, 0
 
 /** A page that shows one particle, and presses it with the left button. Returns the page and what it sends. */
 function pressed() {
+  const page = shown();
+  page.listeners.get("pointerdown")(page.event);
+  page.listeners.get("pointermove")({ ...page.event, clientX: page.event.clientX + 50 });
+  return page;
+}
+
+/** A page that shows one particle, and an event of the mouse on it. */
+function shown(canChange = true) {
   /** @type {Map<string, (event: object) => void>} */
   const listeners = new Map();
   const canvas = {
@@ -28,15 +37,13 @@ function pressed() {
   const sent = [];
   const commands = new Commands((message) => sent.push(message) > 0, () => {});
   const simulation = new Simulation();
-  const app = { simulation, camera: new Camera(), renderer: { viewport: VIEWPORT, isDirty: false }, commands };
-  const input = new Input(canvas, app, () => true);
+  const app = { simulation, camera: new Camera(), renderer: { viewport: VIEWPORT, isDirty: false }, commands, selection: new Selection(simulation) };
+  const input = new Input(canvas, app, () => canChange);
   simulation.receive(SCENE);
   simulation.receive(FRAME);
   const { x, y } = app.camera.project([0, 0, 0], VIEWPORT);
   const event = { pointerId: 1, pointerType: "mouse", button: 0, clientX: x, clientY: y };
-  listeners.get("pointerdown")(event);
-  listeners.get("pointermove")({ ...event, clientX: x + 50 });
-  return { input, simulation, sent };
+  return { input, simulation, sent, listeners, event, selection: app.selection };
 }
 
 test("a reset or another scene ends a grab with a release, and without its last motion", () => {
@@ -66,4 +73,53 @@ test("a motion after a rest is as quick as one without", () => {
   input.tick(start + 1016);
   assert.equal(moves().length, 2);
   assert.ok(moves()[1].over_s < 0.03, `${moves()[1].over_s} s`);
+});
+
+/** Presses, moves by some pixels, and releases. */
+function click({ listeners, event }, pixels, change = {}) {
+  const there = { ...event, ...change };
+  listeners.get("pointerdown")({ ...there, type: "pointerdown" });
+  if (pixels > 0) listeners.get("pointermove")({ ...there, type: "pointermove", clientX: there.clientX + pixels });
+  listeners.get("pointerup")({ ...there, type: "pointerup", clientX: there.clientX + pixels });
+}
+
+test("a click without motion selects and sends nothing, also in a recording", () => {
+  for (const canChange of [true, false]) {
+    const page = shown(canChange);
+    click(page, 2);
+    assert.deepEqual(page.selection.items, [{ kind: "particle", index: 0 }]);
+    click(page, 0, { clientX: 20, clientY: 20 });
+    assert.deepEqual([page.selection.items, page.sent], [[], []]);
+    click(page, 0, { shiftKey: true });
+    assert.equal(page.selection.items.length, 1);
+    click(page, 0, { shiftKey: true });
+    assert.equal(page.selection.items.length, 0);
+  }
+});
+
+test("a drag grabs and does not select, and neither does a press that lasts", () => {
+  const page = shown();
+  click(page, 9);
+  assert.deepEqual(page.sent.map(({ type }) => type).slice(0, 1), ["grab"]);
+  assert.deepEqual(page.selection.items, []);
+  const other = shown();
+  other.listeners.get("pointerdown")(other.event);
+  assert.deepEqual(other.sent, []);
+  other.input.tick(other.input.tool.pressedMs + 250);
+  other.listeners.get("pointerup")({ ...other.event, type: "pointerup" });
+  assert.deepEqual(other.sent.map(({ type }) => type), ["grab", "release"]);
+  assert.deepEqual(other.selection.items, []);
+});
+
+test("a click in another mode, a second finger and Escape select nothing", () => {
+  const page = shown();
+  page.input.mode = "pin";
+  click(page, 0);
+  assert.deepEqual([page.selection.items, page.sent.map(({ type }) => type)], [[], ["pin"]]);
+  page.input.mode = "grab";
+  page.listeners.get("pointerdown")(page.event);
+  page.listeners.get("pointerdown")({ ...page.event, pointerId: 2 });
+  page.listeners.get("pointerup")({ ...page.event, type: "pointerup", pointerId: 2 });
+  page.listeners.get("pointerup")({ ...page.event, type: "pointerup" });
+  assert.deepEqual(page.selection.items, []);
 });

@@ -2,32 +2,10 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { ROWS, SLIDER_STEPS, editable, positionOf, rangeOf, restoring, rowsOf, typedValue, valueAt, valueOf } from "../js/panel/parameters.js";
-import { Series } from "../js/panel/series.js";
+import { ROWS, SLIDER_STEPS, editable, positionOf, rangeOf, restoring, rowsOf, typedValue, valueAt } from "../js/panel/parameters.js";
+import { valueOf } from "../js/net/messages.js";
 import { niceCeiling } from "../js/geometry/round.js";
 import { readable } from "../js/ui/format.js";
-
-test("a series keeps the newest samples, and a column has their minimum and maximum", () => {
-  const series = new Series(4);
-  assert.equal(series.range(), null);
-  for (const value of [1, 9, 2, 8, 3, 7]) series.push(value);
-  assert.equal(series.last(), 7);
-  assert.deepEqual(series.columns(2), [{ min: 2, max: 8 }, { min: 3, max: 7 }]);
-  assert.deepEqual(series.range(), { min: 2, max: 8 });
-});
-
-test("a single peak is visible in its column, however narrow the plot", () => {
-  const series = new Series(1200);
-  for (let i = 0; i < 1200; i++) series.push(i === 700 ? 99 : 1);
-  assert.equal(series.columns(50).filter((column) => column.max === 99).length, 1);
-});
-
-test("unknown samples leave a gap", () => {
-  const series = new Series(2);
-  series.push(NaN);
-  series.push(5);
-  assert.deepEqual(series.columns(2), [null, { min: 5, max: 5 }]);
-});
 
 test("a scale ends at 1, 2 or 5 times a power of ten", () => {
   assert.deepEqual([0.03, 1, 1.01, 4.2, 5, 99, 1e-7].map(niceCeiling), [0.05, 1, 2, 5, 5, 100, 1e-7]);

@@ -50,12 +50,13 @@ test("a time is minutes, seconds and milliseconds", () => {
 });
 
 test("a link restores the view that it was made from", () => {
-  const link = { scene: "spring & cloth", camera: { target: [0.1, -2, 300], distance: 4, yaw: -0.5, pitch: 0.2 }, toggles: { heat: true, sticks: false } };
+  const link = { scene: "spring & cloth", camera: { target: [0.1, -2, 300], distance: 4, yaw: -0.5, pitch: 0.2 }, colour: "tension", toggles: { heat: true, sticks: false } };
   assert.deepEqual(parseLink(`#${formatLink(link)}`), { token: null, ...link });
 });
 
 test("a truncated or hand-written link is read as far as it is valid", () => {
-  assert.deepEqual(parseLink("#token=abc"), { token: "abc", scene: null, camera: null, toggles: {} });
+  assert.deepEqual(parseLink("#token=abc"), { token: "abc", scene: null, camera: null, colour: "strain", toggles: {} });
+  assert.equal(parseLink("colour=blue").colour, "strain");
   for (const camera of ["1,2,3", "1,2,3,x,5,6", "1,2,3,-4,5,6", "", "1,2,3,Infinity,5,6"]) assert.equal(parseLink(`camera=${camera}`).camera, null);
   assert.equal(parseLink("").scene, null);
 });

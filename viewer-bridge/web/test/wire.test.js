@@ -8,7 +8,7 @@ import { decode } from "../js/net/wire.js";
 
 const golden = JSON.parse(readFileSync(new URL("../../tests/golden/messages.json", import.meta.url), "utf8"));
 const SHAPES = ["plane", "box", "sphere", "capsule", "bounds", "mesh"];
-const KINDS = ["", "scene", "frame", "frame", "tear", "pins", "stats", "colliders", "forces"];
+const KINDS = ["", "scene", "frame", "frame", "tear", "pins", "stats", "colliders", "forces", "speeds", "inspected"];
 const RECIPIENTS = ["collider", "anchor", "particle"];
 
 /** Decodes hex into an array buffer that starts at offset 0. */
@@ -19,7 +19,7 @@ const triples = (flat) => Array.from({ length: flat.length / 3 }, (_, i) => [...
 /** Fields of each kind of message, under the names of the golden file. */
 const readers = {
   scene: (m) => ({
-    positions: triples(m.positions), rest_lengths: [...m.restLengths], triangles: triples(m.triangles), kinds: [...m.constraintKinds],
+    positions: triples(m.positions), rest_lengths: [...m.restLengths], triangles: triples(m.triangles), kinds: [...m.constraintKinds], compliances: [...m.compliances],
     ends: Array.from({ length: m.constraintCount }, (_, i) => [m.ends[2 * i], m.ends[2 * i + 1]]),
     min: m.min, max: m.max, origin: m.origin, rate_hz: m.rateHz,
     flags: m.isPlanar ? 1 : 0,
@@ -32,7 +32,7 @@ const readers = {
     flags: (m.isPaused ? 1 : 0) | (m.isReplay ? 2 : 0) | (m.isSaturated ? 4 : 0),
     positions: Array.from({ length: m.particleCount }, (_, i) => [0, 1, 2].map((k) => m.lo[k] + m.scale[k] * m.positions[3 * i + k])),
   }),
-  tear: (m) => ({ first: m.first, constraints: [...m.constraints] }),
+  tear: (m) => ({ first: m.first, constraints: [...m.constraints], causes: [...m.causes].map((cause) => (cause === 255 ? 2 ** 32 - 1 : cause)) }),
   pins: (m) => ({ held: [...m.particles].map((particle, i) => [particle, m.flags[i]]) }),
   stats: (m) => ({
     solve_us: [m.solveUsP50, m.solveUsP99], wake_late_us: [m.wakeLateUsP50, m.wakeLateUsP99], period_us: m.periodUs,
@@ -43,6 +43,8 @@ const readers = {
     encode_us: m.encodeUs, frames_per_second: m.framesPerSecond, flags: (m.isPaused ? 1 : 0) | (m.isReplay ? 2 : 0),
   }),
   colliders: (m) => ({ colliders: m.colliders }),
+  speeds: (m) => ({ speeds: [...m.speeds] }),
+  inspected: (m) => ({ particles: m.rows.map((row) => ({ particle: row.particle, position: row.position, velocity: row.velocity, inverse_mass: row.inverseMass })) }),
   forces: (m) => ({
     rate_hz: m.rateHz,
     rows: m.rows.map((row) => ({ kind: RECIPIENTS.indexOf(row.kind), index: row.index, impulse: row.impulse, angular_impulse: row.angularImpulse, contacts: row.contacts })),

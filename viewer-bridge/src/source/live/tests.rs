@@ -389,7 +389,7 @@ fn forces_are_read_while_a_page_wants_them_and_sent_to_that_page_with_their_fram
     let mut other = fixture.hub.join(Choice::F32);
     fixture.exchange();
     assert_eq!(fixture.owner.forces_reader_count(), 0);
-    fixture.page.set_wants_forces(true);
+    fixture.page.with_wishes(|wishes| wishes.forces = true);
     fixture.exchange();
     assert_eq!(fixture.owner.forces_reader_count(), 1);
     let row = |step: f32| ForceRow { kind: 2, impulse: [0.0, step, 0.0], ..ForceRow::default() };
@@ -410,11 +410,42 @@ fn forces_are_read_while_a_page_wants_them_and_sent_to_that_page_with_their_fram
     fixture.publish(3, 0, 2);
     fixture.read();
     assert!(matches!(Fixture::received(&mut fixture.page)[..], [Wire::Frame(_)]));
-    other.set_wants_forces(true);
-    fixture.page.set_wants_forces(false);
+    other.with_wishes(|wishes| wishes.forces = true);
+    fixture.page.with_wishes(|wishes| wishes.forces = false);
     fixture.exchange();
     assert_eq!(fixture.owner.forces_reader_count(), 1, "another page wants them");
     fixture.hub.leave(other.client);
     fixture.exchange();
     assert_eq!(fixture.owner.forces_reader_count(), 0);
+}
+
+#[test]
+fn a_page_receives_the_speeds_and_the_exact_particles_that_it_asks_for_with_their_frame() {
+    let mut fixture = Fixture::start();
+    let mut other = fixture.hub.join(Choice::F32);
+    fixture.page.with_wishes(|wishes| wishes.speeds = true);
+    other.with_wishes(|wishes| wishes.particles = vec![1, 9]);
+    fixture.publish(1, 0, 2);
+    fixture.read();
+    let [Wire::Speeds(speeds), Wire::Frame(frame)] = &Fixture::received(&mut fixture.page)[..]
+    else {
+        panic!("not SPEEDS and FRAME")
+    };
+    assert_eq!((speeds.stamp, speeds.speeds.len()), (frame.head.stamp, 2));
+    let [Wire::Inspected(inspected), Wire::Frame(frame)] = &Fixture::received(&mut other)[..]
+    else {
+        panic!("not INSPECTED and FRAME")
+    };
+    let particles: Vec<_> = inspected.particles.iter().map(|one| one.particle).collect();
+    assert_eq!(particles, [1], "the load has no particle 9");
+    assert_eq!(inspected.stamp, frame.head.stamp);
+    assert_eq!(inspected.particles[0].position, frame.positions[1]);
+
+    fixture.page.with_wishes(|wishes| wishes.speeds = false);
+    other.with_wishes(|wishes| wishes.particles.clear());
+    fixture.publish(2, 0, 2);
+    fixture.read();
+    for page in [&mut fixture.page, &mut other] {
+        assert!(matches!(Fixture::received(page)[..], [Wire::Frame(_)]));
+    }
 }

@@ -55,6 +55,31 @@ export function particlesWithin(points, viewProjection, viewport, at, radius) {
   return particles;
 }
 
+/**
+ * The constraint at a pixel: of those within `radius`, the nearest one in the foremost layer.
+ * @param {Points} points @param {Mat4} viewProjection @param {Viewport} viewport @param {Pixel} at @param {number} radius
+ * @param {ArrayLike<number>} ends @param {(constraint: number) => boolean} isShown @returns {number | null}
+ */
+export function pickConstraint(points, viewProjection, viewport, at, radius, ends, isShown) {
+  const pixels = projectAll(points, viewProjection, viewport);
+  const m = frameToClip(viewProjection, points);
+  const p = points.positions;
+  const depth = (/** @type {number} */ i) => m[3] * p[3 * i] + m[7] * p[3 * i + 1] + m[11] * p[3 * i + 2] + m[15];
+  /** @type {{ constraint: number, squared: number, w: number }[]} */
+  const near = [];
+  for (let i = 0; 2 * i < ends.length; i++) {
+    const a = ends[2 * i], b = ends[2 * i + 1];
+    const [ax, ay, bx, by] = [pixels[2 * a], pixels[2 * a + 1], pixels[2 * b], pixels[2 * b + 1]];
+    const long = (bx - ax) ** 2 + (by - ay) ** 2;
+    const t = long > 0 ? Math.min(1, Math.max(0, ((at.x - ax) * (bx - ax) + (at.y - ay) * (by - ay)) / long)) : 0;
+    const squared = (ax + t * (bx - ax) - at.x) ** 2 + (ay + t * (by - ay) - at.y) ** 2;
+    if (squared <= radius * radius && isShown(i)) near.push({ constraint: i, squared, w: depth(a) + t * (depth(b) - depth(a)) });
+  }
+  if (near.length === 0) return null;
+  const layer = near.reduce((least, one) => Math.min(least, one.w), Infinity) * (1 + (LAYER_RADII * radius) / viewport.height);
+  return near.filter((one) => one.w <= layer).reduce((best, one) => (one.squared < best.squared ? one : best)).constraint;
+}
+
 /** Grain of the pixels of `projectAll`: with 24 bits, they are exact up to 16,384. */
 const PIXEL_GRAIN = 2 ** -10;
 const onGrid = (/** @type {number} */ pixel) => Math.round(pixel / PIXEL_GRAIN) * PIXEL_GRAIN;

@@ -69,6 +69,8 @@ export class SceneBuffers {
     this.fans = new ArrayTexture(gl, UNITS.u_fans, formats.u32x4, scene.triangles.length);
     /** Vertices of the pieces of split triangles; see SPLIT_WORDS. @type {ArrayTexture} */
     this.splits = new ArrayTexture(gl, UNITS.u_splits, formats.u32x4, 0);
+    /** Speeds of the particles; empty until they colour the picture. */
+    this.speeds = new ArrayTexture(gl, UNITS.u_speeds, formats.f32x1, 0);
     if (scene.particleCount > 0) this.fanRanges.write(topology.fanRanges);
     const { hasEffects } = drawables.variant;
     this.planks = hasEffects ? planksOf(scene) : [];
@@ -77,7 +79,7 @@ export class SceneBuffers {
     /** Places of the particles in the surface laid flat. @type {ArrayTexture | null} */
     this.flatPlaces = hasEffects ? new ArrayTexture(gl, UNITS.u_flat_places, formats.f32x2, scene.particleCount) : null;
     if (scene.particleCount > 0) this.flatPlaces?.write(layFlat(topology));
-    drawables.sticks.setSticks(scene, drawnSticks(scene, STICKS_MAX), topology.styles, hasEffects ? this.radii() : new Float32Array(scene.constraintCount));
+    drawables.sticks.setSticks(topology, drawnSticks(scene, STICKS_MAX), hasEffects ? this.radii() : new Float32Array(scene.constraintCount));
     this.writeTopology(true);
     this.writeParticles();
     this.writeMarks();
@@ -95,6 +97,15 @@ export class SceneBuffers {
     if (frame.particleCount > 0) this.positions.write(frame.positions);
   }
 
+  /** @param {Float32Array} speeds */
+  writeSpeeds(speeds) {
+    if (this.speeds.count !== speeds.length) {
+      this.speeds.delete();
+      this.speeds = new ArrayTexture(this.gl, UNITS.u_speeds, layouts(this.gl).f32x1, speeds.length);
+    }
+    if (speeds.length > 0) this.speeds.write(speeds);
+  }
+
   /** Uploads the intact triangles and sticks, and the changed fan entries. @param {boolean} [isAll] */
   writeTopology(isAll = false) {
     const { topology, drawables, fans, hidden } = this;
@@ -107,7 +118,7 @@ export class SceneBuffers {
     this.splits.write(vertices);
     drawables.cloth.setTriangles(hidden === null ? topology.indices : topology.indices.map((particle, corner) => (hidden[Math.floor(corner / 3)] ? 0 : particle)), indices);
     drawables.setPlanks(this.planks, topology.styles);
-    if (!isAll) drawables.sticks.setStyles(topology.styles);
+    if (!isAll) drawables.sticks.update(topology);
   }
 
   /** Lists the particles that have a position, up to a limit. */
@@ -131,7 +142,7 @@ export class SceneBuffers {
   }
 
   delete() {
-    for (const texture of [this.positions, this.fanRanges, this.fans, this.splits, this.flatPlaces]) texture?.delete();
+    for (const texture of [this.positions, this.fanRanges, this.fans, this.splits, this.speeds, this.flatPlaces]) texture?.delete();
     this.drawables.clear();
   }
 }

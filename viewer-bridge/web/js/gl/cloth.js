@@ -2,7 +2,7 @@
 // triangles around it, so after a tear the CPU only lists the triangles that are gone.
 
 import { Program, UNITS } from "./context.js";
-import { BLUR, HEADER, HEAT, LIGHT, SCREEN, SHADOW, positionReader, sunlight } from "./shaders.js";
+import { BLUR, HEADER, HEAT, LIGHT, PAINT, SCREEN, SHADOW, VALUES, positionReader, sunlight } from "./shaders.js";
 
 /** Defines surface_position(vertex, particle): a vertex is a particle, or moves with one (state/splits.js). */
 const SURFACE_POSITION = `
@@ -72,24 +72,28 @@ const NO_WEAVE = "float weave(vec2 place, vec3 at) { return 1.0; }\n";
 const NORMAL_FROM_FAN = `
 uniform usampler2D u_fan_ranges;
 uniform usampler2D u_fans;
+uniform float u_paint;
 void main() {
   uint particle;
   vec3 surface = surface_position(uint(gl_VertexID), particle);
   vec3 at = position(particle);
   uvec2 range = texelFetch(u_fan_ranges, texel(particle), 0).xy;
   vec3 normal = vec3(0.0);
-  float strain = 0.0;
-  float edges = 0.0;
+  float value = 0.0;
+  float known = 0.0;
   for (uint entry = range.x; entry < range.x + range.y; entry++) {
     uvec4 fan = texelFetch(u_fans, texel(entry), 0);
     vec3 to_first = position(fan.x) - at;
     normal += cross(to_first, position(fan.y) - at);
-    float rest_length = uintBitsToFloat(fan.z);
-    if (rest_length > 0.0) { strain += length(to_first) / rest_length - 1.0; edges += 1.0; }
+    float gain = uintBitsToFloat(fan.w);
+    if (gain != 0.0) { value += value_of(length(to_first), uintBitsToFloat(fan.z), gain); known += 1.0; }
   }
   v_position = surface;
   v_normal = normal;
-  v_strain = strain / max(edges, 1.0);
+  v_value = value / max(known, 1.0);
+  v_known = min(known, 1.0);
+  if (u_paint == ${PAINT.speeds.toFixed(1)}) { v_value = speed(particle); v_known = 1.0; }
+  if (u_paint == ${PAINT.kinds.toFixed(1)}) v_known = 0.0;
   v_flat_place = flat_place(uint(gl_VertexID));
   gl_Position = u_view_projection * vec4(surface, 1.0);
 }
@@ -100,15 +104,17 @@ const vertex = ({ isQuantised, hasEffects }) => `${HEADER}
 uniform mat4 u_view_projection;
 out vec3 v_position;
 out vec3 v_normal;
-out float v_strain;
+out float v_value;
+out float v_known;
 out vec2 v_flat_place;
-${positionReader(isQuantised)}${SURFACE_POSITION}${hasEffects ? FLAT_PLACE : NO_FLAT_PLACE}${NORMAL_FROM_FAN}`;
+${positionReader(isQuantised)}${VALUES}${SURFACE_POSITION}${hasEffects ? FLAT_PLACE : NO_FLAT_PLACE}${NORMAL_FROM_FAN}`;
 
 /** @param {import("./context.js").Variant} variant */
 const fragment = ({ hasEffects }) => `${HEADER}${SCREEN}${LIGHT}${HEAT}${sunlight(hasEffects)}${hasEffects ? WEAVE : NO_WEAVE}
 in vec3 v_position;
 in vec3 v_normal;
-in float v_strain;
+in float v_value;
+in float v_known;
 in vec2 v_flat_place;
 uniform vec3 u_eye;
 uniform vec3 u_front;
@@ -117,16 +123,16 @@ uniform vec4 u_flat;
 void main() {
   vec3 base = gl_FrontFacing ? u_front : u_back;
   if (u_flat.a > 0.0) {
-    o_color = screen(u_heat_max > 0.0 ? heat(v_strain) : u_flat.rgb, u_flat.a);
+    o_color = screen(u_paint > 0.0 ? heat(v_value, v_known) : u_flat.rgb, u_flat.a);
     return;
   }
   vec3 face = cross(dFdx(v_position), dFdy(v_position));
   vec3 normal = dot(v_normal, v_normal) > 0.0 ? normalize(v_normal) : normalize(face);
   normal = gl_FrontFacing ? normal : -normal;
   vec3 to_eye = normalize(u_eye - v_position);
-  bool is_heat = u_heat_max > 0.0;
+  bool is_heat = u_paint > 0.0;
   base *= weave(v_flat_place, v_position);
-  if (is_heat) base = heat(v_strain);
+  if (is_heat) base = heat(v_value, v_known);
   vec3 color = lit(base, v_position, normal, to_eye, is_heat ? 0.2 : 1.0, sunlight(v_position, normal, ${BLUR.scene}));
   // Shading would distort the colours of the heat map, so about half of it is unshaded.
   o_color = screen(is_heat ? mix(base, color, 0.45) : color, 1.0);

@@ -6,7 +6,7 @@
 export const ROW = 1024;
 
 /** Texture units by the samplers of the shaders. */
-export const UNITS = Object.freeze({ u_positions: 0, u_fan_ranges: 1, u_fans: 2, u_splits: 3, u_flat_places: 4, u_shadow_map: 5 });
+export const UNITS = Object.freeze({ u_positions: 0, u_fan_ranges: 1, u_fans: 2, u_splits: 3, u_flat_places: 4, u_shadow_map: 5, u_speeds: 6 });
 
 /**
  * Opens the WebGL2 context of a canvas; null if the browser has no WebGL2. The canvas is opaque, because
@@ -95,11 +95,12 @@ function link(gl, vertex, fragment) {
 /** Storage of the texels of a texture: internal format, format, type, and components per texel.
  * @typedef {{ internal: number, format: number, type: number, width: number }} Layout */
 
-/** @param {GL} gl @returns {Record<"u16x3" | "f32x3" | "f32x2" | "u32x2" | "u32x4", Layout>} */
+/** @param {GL} gl @returns {Record<"u16x3" | "f32x3" | "f32x2" | "f32x1" | "u32x2" | "u32x4", Layout>} */
 export const layouts = (gl) => ({
   u16x3: { internal: gl.RGB16UI, format: gl.RGB_INTEGER, type: gl.UNSIGNED_SHORT, width: 3 },
   f32x3: { internal: gl.RGB32F, format: gl.RGB, type: gl.FLOAT, width: 3 },
   f32x2: { internal: gl.RG32F, format: gl.RG, type: gl.FLOAT, width: 2 },
+  f32x1: { internal: gl.R32F, format: gl.RED, type: gl.FLOAT, width: 1 },
   u32x2: { internal: gl.RG32UI, format: gl.RG_INTEGER, type: gl.UNSIGNED_INT, width: 2 },
   u32x4: { internal: gl.RGBA32UI, format: gl.RGBA_INTEGER, type: gl.UNSIGNED_INT, width: 4 },
 });

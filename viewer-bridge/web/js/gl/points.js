@@ -1,7 +1,7 @@
 // Particles as small balls; marks of pinned, anchored, grabbed and frozen particles as discs with a white ring.
 
 import { Program, UNITS } from "./context.js";
-import { HEADER, SCREEN, SHADOW, positionReader } from "./shaders.js";
+import { HEADER, HEAT, PAINT, SCREEN, SHADOW, VALUES, positionReader } from "./shaders.js";
 
 /** Styles of a point, as the shader numbers them. */
 export const POINT = Object.freeze({ particle: 0, pin: 1, anchor: 2, grabbed: 3, frozen: 4 });
@@ -20,14 +20,17 @@ uniform float u_radius_min;
 uniform float u_forward;
 flat out uint v_style;
 flat out float v_diameter;
+flat out float v_speed;
 out float v_height;
-${positionReader(isQuantised)}
+uniform float u_paint;
+${positionReader(isQuantised)}${VALUES}
 void main() {
   vec3 at = position(a_particle);
   vec4 clip = u_view_projection * vec4(at, 1.0);
   float radius = max(u_radius_min, u_radius * u_pixels_per_unit / clip.w);
   if (a_style != ${POINT.particle}u) radius *= a_style == ${POINT.grabbed}u ? 1.35 : 1.0;
   v_style = a_style;
+  v_speed = u_paint == ${PAINT.speeds.toFixed(1)} ? speed(a_particle) : 0.0;
   v_diameter = radius * 2.0 + 1.0;
   v_height = dot(u_ground.xyz, at) - u_ground.w;
   gl_PointSize = v_diameter;
@@ -35,9 +38,10 @@ void main() {
 }
 `;
 
-const FRAGMENT = `${HEADER}${SHADOW}${SCREEN}
+const FRAGMENT = `${HEADER}${SHADOW}${SCREEN}${HEAT}
 flat in uint v_style;
 flat in float v_diameter;
+flat in float v_speed;
 in float v_height;
 uniform vec3 u_particle;
 uniform vec3 u_marks[4];
@@ -57,7 +61,8 @@ void main() {
   if (v_style == ${POINT.particle}u) {
     float up = sqrt(max(0.0, 1.0 - away * away));
     float light = 0.5 + 0.6 * max(0.0, dot(vec3(at.x, -at.y, up), normalize(vec3(-0.4, 0.6, 0.8))));
-    o_color = screen(u_particle * mix(1.0, light, u_round * smoothstep(5.0, 9.0, v_diameter)), alpha);
+    vec3 base = u_paint == ${PAINT.speeds.toFixed(1)} ? heat(v_speed, 1.0) : u_particle;
+    o_color = screen(base * mix(1.0, light, u_round * smoothstep(5.0, 9.0, v_diameter)), alpha);
     return;
   }
   float ring = smoothstep(0.62 - soft, 0.62, away);

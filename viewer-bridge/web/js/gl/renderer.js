@@ -2,7 +2,8 @@
 // only if something has.
 
 import { add, addScaled, dot, multiply, normalize, scale, scaleThenMove, shadowOnto, tangents } from "../geometry/math.js";
-import { HEAT_STOPS, linear, paletteOf } from "./theme.js";
+import { HEAT_STOPS, KIND_COLORS, linear, paletteOf } from "./theme.js";
+import { PAINT } from "./shaders.js";
 import { isSoftware, openContext, rendererName } from "./context.js";
 import { Arrows } from "./arrows.js";
 import { Drawables, SceneBuffers } from "./buffers.js";
@@ -22,6 +23,7 @@ import { polesOf } from "../state/shapes.js";
 /** Limit on device pixels per CSS pixel: the cost grows with the square, and a finer picture looks the same. */
 const PIXEL_RATIO_MAX = 2;
 const HEAT_COLORS = HEAT_STOPS.flatMap((hex) => linear(hex));
+const KIND_UNIFORM = KIND_COLORS.flatMap((hex) => linear(hex));
 /** Distance of the lamp, in radii of the scene. */
 const LAMP_RADII = 2.6;
 /** Size of the ground, in radii of the scene; it fades out towards its edge. */
@@ -54,7 +56,8 @@ export class Renderer {
     this.isDark = false;
     /** CSS pixels of the canvas. */
     this.viewport = { width: 1, height: 1 };
-    this.heatMax = 0.05;
+    /** What the colours show, and the values at both ends of the ramp. @type {{ quantity: import("../state/quantity.js").Quantity, low: number, high: number }} */
+    this.coloring = { quantity: "strain", low: -0.05, high: 0.05 };
     /** @type {Toggles} */
     this.toggles = { surface: true, sticks: false, particles: false, pins: true, heat: false, shadow: true, forces: false, effects: !isSoftware(rendererName(gl)) };
     this.forceScale = new ForceScale();
@@ -204,11 +207,20 @@ export class Renderer {
     if (stale.particles) this.buffers.writeParticles();
     if (stale.marks) this.buffers.writeMarks();
     if (frame !== this.frameDrawn) this.buffers.writePositions(frame);
+    if (simulation.speeds !== null && this.paint() === PAINT.speeds) this.buffers.writeSpeeds(simulation.speeds.speeds);
     if (stale.colliders) this.placeColliders(scene.isPlanar);
     if (stale.poles) this.placePoles();
     this.frameDrawn = frame;
     this.stepDrawn = frame.step;
     this.stale = { topology: false, particles: false, marks: false, colliders: false, poles: false };
+  }
+
+  /** What the shaders colour by. Speeds that have not arrived yet are not drawn. */
+  paint() {
+    if (!this.toggles.heat) return PAINT.off;
+    const { quantity } = this.coloring;
+    if (quantity === "speed") return this.simulation.speeds === null ? PAINT.off : PAINT.speeds;
+    return quantity === "kind" ? PAINT.kinds : PAINT.constraints;
   }
 
   /** @param {import("./context.js").Variant} variant */
@@ -264,7 +276,8 @@ export class Renderer {
       u_lamp: addScaled(simulation.middle(), light, simulation.radius() * LAMP_RADII),
       u_pixels_per_unit: (projection[5] * canvas.height) / 2, u_near: isFlat ? 0 : camera.distance * 0.02,
       u_sky: palette.sky, u_bounce: palette.bounce, u_key: palette.key,
-      u_heat_max: this.toggles.heat ? this.heatMax : 0, u_heat_stops: HEAT_COLORS,
+      u_paint: this.paint(), u_heat_low: this.coloring.low, u_heat_high: this.coloring.high, u_heat_stops: HEAT_COLORS,
+      u_unknown: palette.unknown, u_kinds: KIND_UNIFORM,
       u_front: palette.front, u_back: palette.back, u_flat: isFlat ? [...palette.flatSurface, 0.85] : [0, 0, 0, 0],
       u_stick: isFlat && hasSurface ? palette.flatStick : palette.stick, u_stick_faint: palette.stickFaint,
       // A dark ball is invisible on the dark end of the heat map.
@@ -400,7 +413,7 @@ export class Renderer {
 
   /** @param {Uniforms} uniforms */
   drawSticks(uniforms) {
-    const isAll = this.toggles.sticks || !this.hasSurface() || !this.toggles.surface;
+    const isAll = this.toggles.sticks || this.paint() === PAINT.kinds || !this.hasSurface() || !this.toggles.surface;
     this.drawables?.sticks.draw({ ...uniforms, u_is_all: isAll ? 1 : 0 });
   }
 

@@ -18,14 +18,31 @@ ivec2 texel(uint index) { return ivec2(int(index & 1023u), int(index >> 10u)); }
 vec3 position(uint particle) { return u_lo + u_scale * vec3(texelFetch(u_positions, texel(particle), 0).xyz); }
 `;
 
-/** Defines heat(strain), the colour of a strain. u_heat_max is the strain at the end of the ramp; 0 turns the heat map off. */
+/** Values of u_paint: what the picture is coloured by. */
+export const PAINT = Object.freeze({ off: 0, constraints: 1, speeds: 2, kinds: 3 });
+
+/** Defines heat(value), the colour of a value between the ends of the scale, and that of an unknown one. */
 export const HEAT = `
-uniform float u_heat_max;
+uniform float u_paint;
+uniform float u_heat_low;
+uniform float u_heat_high;
+uniform vec3 u_unknown;
 uniform vec3 u_heat_stops[${HEAT_STOPS.length}];
-vec3 heat(float strain) {
-  float at = clamp(strain / u_heat_max, 0.0, 1.0) * ${(HEAT_STOPS.length - 1).toFixed(1)};
+vec3 heat(float value, float known) {
+  if (known < 0.5) return u_unknown;
+  float at = clamp((value / known - u_heat_low) / (u_heat_high - u_heat_low), 0.0, 1.0) * ${(HEAT_STOPS.length - 1).toFixed(1)};
   int stop = min(int(at), ${HEAT_STOPS.length - 2});
   return mix(u_heat_stops[stop], u_heat_stops[stop + 1], at - float(stop));
+}
+`;
+
+/** Defines speed(particle), and value_of(length, rest_length, gain) of a constraint (state/quantity.js). */
+export const VALUES = `
+uniform highp sampler2D u_speeds;
+float speed(uint particle) { return texelFetch(u_speeds, texel(particle), 0).x; }
+float value_of(float span, float rest_length, float gain) {
+  float value = (span - rest_length) * abs(gain);
+  return gain < 0.0 ? max(value, 0.0) : value;
 }
 `;
 

@@ -1,12 +1,13 @@
 // Constraints as sticks. Each is one instanced quad around a capsule on the screen, because WebGL lines
 // are only one pixel wide.
 
+import { CONSTRAINT } from "../net/wire.js";
 import { STICK } from "../state/topology.js";
 import { Program, UNITS } from "./context.js";
-import { BLUR, CORNER, HEADER, HEAT, LIGHT, SCREEN, SHADOW, positionReader, sunlight } from "./shaders.js";
+import { BLUR, CORNER, HEADER, HEAT, LIGHT, PAINT, SCREEN, SHADOW, VALUES, positionReader, sunlight } from "./shaders.js";
 
-/** Words per instance: two ends, rest length as f32 bits, style, radius as a solid body as f32 bits. */
-const WORDS = 5;
+/** Words per instance: two ends, rest length and gain as f32 bits, style, radius as a solid body as f32 bits. */
+const WORDS = 6;
 
 /**
  * Defines rod(t, aside), the colour of a solid rod at a fraction of its length, and at a distance from its
@@ -41,6 +42,8 @@ layout(location = 0) in uvec2 a_ends;
 layout(location = 1) in float a_rest_length;
 layout(location = 2) in uint a_style;
 layout(location = 3) in float a_radius;
+layout(location = 4) in float a_gain;
+uniform float u_paint;
 uniform mat4 u_view_projection;
 uniform vec2 u_viewport;
 uniform float u_pixels_per_unit;
@@ -55,13 +58,14 @@ flat out float v_radius;
 out vec2 v_pixel;
 flat out vec4 v_segment;
 flat out vec2 v_radii;
-flat out float v_strain;
+out float v_value;
+flat out float v_known;
 flat out uint v_kind;
 out float v_height;
-${positionReader(isQuantised)}
+${positionReader(isQuantised)}${VALUES}
 void main() {
   uint kind = a_style & ${STICK.kindMask}u;
-  bool is_hidden = (a_style & ${STICK.isGone}u) != 0u;
+  bool is_hidden = (a_style & ${STICK.isGone}u) != 0u || (kind == ${CONSTRAINT.bend}u && u_paint != ${PAINT.kinds.toFixed(1)});
   bool is_solid = u_is_solid > 0.5 && a_radius > 0.0;
   bool is_thread = kind == 0u && ((a_style & ${STICK.isCovered}u) == 0u || is_solid);
   gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
@@ -88,7 +92,9 @@ void main() {
   v_pixel = (at.x < 0.0 ? pa : pb) + along * at.x * wide + across * at.y * wide;
   v_segment = vec4(pa, pb);
   v_radii = radii;
-  v_strain = length(xb - xa) / max(a_rest_length, 1e-20) - 1.0;
+  bool is_speed = u_paint == ${PAINT.speeds.toFixed(1)};
+  v_value = is_speed ? speed(at.x < 0.0 ? a_ends.x : a_ends.y) : value_of(length(xb - xa), a_rest_length, a_gain);
+  v_known = is_speed || a_gain != 0.0 ? 1.0 : 0.0;
   v_kind = kind;
   v_height = dot(u_ground.xyz, at.x < 0.0 ? xa : xb) - u_ground.w;
   float depth = at.x < 0.0 ? a.z / a.w : b.z / b.w;
@@ -103,11 +109,13 @@ flat in float v_radius;
 in vec2 v_pixel;
 flat in vec4 v_segment;
 flat in vec2 v_radii;
-flat in float v_strain;
+in float v_value;
+flat in float v_known;
 flat in uint v_kind;
 in float v_height;
 uniform vec3 u_stick;
 uniform vec3 u_stick_faint;
+uniform vec3 u_kinds[4];
 uniform float u_round;
 uniform float u_opacity;
 ${hasEffects ? LIGHT + sunlight(true) + ROD : NO_ROD}
@@ -124,11 +132,12 @@ void main() {
     return;
   }
   if (alpha < 0.03) discard;
-  vec3 base = u_heat_max > 0.0 ? heat(v_strain) : v_kind == 0u ? u_stick : u_stick_faint;
+  vec3 base = v_kind == 0u ? u_stick : u_stick_faint;
+  if (u_paint > 0.0) base = u_paint == ${PAINT.kinds.toFixed(1)} ? u_kinds[int(v_kind)] : heat(v_value, v_known);
   // A thick stick is shaded like a rod: darker towards its edges.
   float edge = clamp(away / max(radius, 1e-3), 0.0, 1.0);
   float shade = mix(1.0, 0.45 + 0.65 * sqrt(1.0 - edge * edge), u_round * smoothstep(1.5, 4.0, radius));
-  bool is_lit = v_radius > 0.0 && u_heat_max <= 0.0;
+  bool is_lit = v_radius > 0.0 && u_paint <= 0.0;
   vec2 aside = (v_pixel - v_segment.xy - along * t) / max(radius, 1e-3);
   o_color = screen(is_lit ? rod(t, aside) : base * shade, alpha * (is_lit ? 1.0 : u_opacity));
 }
@@ -147,8 +156,8 @@ export class Sticks {
     this.words = new Uint32Array(0);
   }
 
-  /** @param {import("../net/wire.js").Scene} scene @param {Uint32Array} drawn @param {Uint8Array} styles @param {Float32Array} radii of all constraints */
-  setSticks(scene, drawn, styles, radii) {
+  /** @param {import("../state/topology.js").Topology} topology @param {Uint32Array} drawn @param {Float32Array} radii of all constraints */
+  setSticks({ scene, styles, gains }, drawn, radii) {
     const { gl } = this;
     this.drawn = drawn;
     this.words = new Uint32Array(drawn.length * WORDS);
@@ -157,17 +166,19 @@ export class Sticks {
       this.words[k * WORDS] = scene.ends[2 * constraint];
       this.words[k * WORDS + 1] = scene.ends[2 * constraint + 1];
       numbers[k * WORDS + 2] = scene.restLengths[constraint];
-      this.words[k * WORDS + 3] = styles[constraint];
-      numbers[k * WORDS + 4] = radii[constraint];
+      numbers[k * WORDS + 3] = gains[constraint];
+      this.words[k * WORDS + 4] = styles[constraint];
+      numbers[k * WORDS + 5] = radii[constraint];
     });
     gl.bindVertexArray(this.vao);
     gl.bindBuffer(gl.ARRAY_BUFFER, this.buffer);
     gl.bufferData(gl.ARRAY_BUFFER, this.words, gl.DYNAMIC_DRAW);
     gl.vertexAttribIPointer(0, 2, gl.UNSIGNED_INT, WORDS * 4, 0);
     gl.vertexAttribPointer(1, 1, gl.FLOAT, false, WORDS * 4, 8);
-    gl.vertexAttribIPointer(2, 1, gl.UNSIGNED_INT, WORDS * 4, 12);
-    gl.vertexAttribPointer(3, 1, gl.FLOAT, false, WORDS * 4, 16);
-    for (const location of [0, 1, 2, 3]) {
+    gl.vertexAttribPointer(4, 1, gl.FLOAT, false, WORDS * 4, 12);
+    gl.vertexAttribIPointer(2, 1, gl.UNSIGNED_INT, WORDS * 4, 16);
+    gl.vertexAttribPointer(3, 1, gl.FLOAT, false, WORDS * 4, 20);
+    for (const location of [0, 1, 2, 3, 4]) {
       gl.enableVertexAttribArray(location);
       gl.vertexAttribDivisor(location, 1);
     }
@@ -182,10 +193,14 @@ export class Sticks {
     gl.bufferData(gl.ARRAY_BUFFER, this.words, gl.DYNAMIC_DRAW);
   }
 
-  /** @param {Uint8Array} styles of all constraints */
-  setStyles(styles) {
+  /** Uploads the styles and gains again. @param {import("../state/topology.js").Topology} topology */
+  update({ styles, gains }) {
     const { gl } = this;
-    for (let k = 0; k < this.drawn.length; k++) this.words[k * WORDS + 3] = styles[this.drawn[k]];
+    const floats = new Float32Array(this.words.buffer);
+    for (let k = 0; k < this.drawn.length; k++) {
+      floats[k * WORDS + 3] = gains[this.drawn[k]];
+      this.words[k * WORDS + 4] = styles[this.drawn[k]];
+    }
     gl.bindBuffer(gl.ARRAY_BUFFER, this.buffer);
     gl.bufferSubData(gl.ARRAY_BUFFER, 0, this.words);
   }

@@ -31,3 +31,11 @@ export function toNumber(value) {
   if (value === "inf") return Infinity;
   return value === "-inf" ? -Infinity : NaN;
 }
+
+/** A parameter, for one kind of constraint if it is per kind. Null if it is off, or if each constraint has its own value.
+ * @param {Values | null} values @param {string} name @param {string} kind @returns {ParameterValue} */
+export function valueOf(values, name, kind) {
+  const value = values?.[name] ?? null;
+  if (value === null || typeof value !== "object" || Array.isArray(value)) return typeof value === "string" ? toNumber(value) : value;
+  return value[kind] ?? null;
+}

@@ -13,8 +13,8 @@
  *   min: Vec3, max: Vec3, rateHz: number, origin: Vec3,
  *   positions: Float32Array, ends: Uint32Array, restLengths: Float32Array, triangles: Uint32Array,
  *   constraintKinds: Uint8Array, name: string, unit: string, up: string, runId: string,
- *   meshes: Map<number, ColliderMesh>, shapes: Shape[],
- * }} Scene  array lengths for n particles, s constraints and t triangles: 3 n, 2 s, s, 3 t, s
+ *   meshes: Map<number, ColliderMesh>, shapes: Shape[], compliances: Float32Array,
+ * }} Scene  array lengths for n particles, s constraints and t triangles: 3 n, 2 s, s, 3 t, s; compliances: s, or stiffness in pbd
  *
  * @typedef {{ shape: string, first: number, count: number }} Shape  a generated shape, with its particles
  *
@@ -26,7 +26,7 @@
  *   positions: Float32Array | Uint16Array, nonFinite: Uint32Array,
  * }} Frame  coordinate = lo + scale · value; lo is 0 and scale 1 unless quantised; bounds is a box around them
  *
- * @typedef {Header & { kind: "tear", first: number, constraints: Uint32Array }} Tear
+ * @typedef {Header & { kind: "tear", first: number, constraints: Uint32Array, causes: Uint8Array }} Tear
  * @typedef {Header & { kind: "pins", particles: Uint32Array, flags: Uint32Array }} Pins
  *
  * @typedef {Header & {
@@ -49,7 +49,10 @@
  *
  * @typedef {{ kind: "collider" | "anchor" | "particle", index: number, impulse: Vec3, angularImpulse: Vec3, contacts: number }} ForceRow  in N s and N m s
  * @typedef {Header & { kind: "forces", rateHz: number, rows: ForceRow[] }} Forces
- * @typedef {Scene | Frame | Tear | Pins | Stats | Colliders | Forces} Message
+ * @typedef {Header & { kind: "speeds", speeds: Float32Array }} Speeds
+ * @typedef {{ particle: number, position: Vec3, velocity: Vec3, inverseMass: number }} InspectedRow
+ * @typedef {Header & { kind: "inspected", rows: InspectedRow[] }} Inspected
+ * @typedef {Scene | Frame | Tear | Pins | Stats | Colliders | Forces | Speeds | Inspected} Message
  */
 
 /** Flags of a particle in PINS. */
@@ -64,6 +67,7 @@ const SHAPES = /** @type {const} */ (["plane", "box", "sphere", "capsule", "boun
 const COLLIDER_BYTES = 120;
 const RECIPIENTS = /** @type {const} */ (["collider", "anchor", "particle"]);
 const FORCE_BYTES = 40;
+const INSPECTED_BYTES = 32;
 
 /** Reads consecutive fields of a message. Throws a RangeError beyond its end. */
 class Reader {
@@ -123,6 +127,8 @@ const DECODERS = /** @type {Record<number, (reader: Reader, header: Header) => M
   6: decodeStats,
   7: decodeColliders,
   8: decodeForces,
+  9: decodeSpeeds,
+  10: decodeInspected,
 });
 
 /**
@@ -162,7 +168,7 @@ function decodeScene(reader, header) {
     isPlanar: (flags & 1) !== 0,
     min, max, rateHz, origin, positions, ends, restLengths, triangles, constraintKinds,
     name: json.name ?? "", unit: json.unit ?? "m", up: json.up ?? "y", runId: json.run_id ?? "", shapes: json.shapes ?? [],
-    meshes: decodeMeshes(reader),
+    meshes: decodeMeshes(reader), compliances: reader.array(Float32Array, constraintCount),
   };
 }
 
@@ -207,7 +213,7 @@ function decodeFrame(reader, header, isQuantised) {
 function decodeTear(reader, header) {
   const first = reader.u32();
   const count = reader.u32();
-  return { kind: "tear", ...header, first, constraints: reader.array(Uint32Array, count) };
+  return { kind: "tear", ...header, first, constraints: reader.array(Uint32Array, count), causes: reader.array(Uint8Array, count) };
 }
 
 /** @param {Reader} reader @param {Header} header @returns {Pins} */
@@ -289,4 +295,22 @@ function decodeForces(reader, header) {
     if (kind !== undefined) rows.push({ kind, index, impulse, angularImpulse, contacts });
   }
   return { kind: "forces", ...header, rateHz, rows };
+}
+
+/** @param {Reader} reader @param {Header} header @returns {Speeds} */
+function decodeSpeeds(reader, header) {
+  const count = reader.u32();
+  reader.u32();
+  return { kind: "speeds", ...header, speeds: reader.array(Float32Array, count) };
+}
+
+/** @param {Reader} reader @param {Header} header @returns {Inspected} */
+function decodeInspected(reader, header) {
+  const count = reader.u32();
+  reader.u32();
+  if (reader.at + count * INSPECTED_BYTES > reader.view.byteLength) throw new RangeError("the message ends within its particles");
+  /** @type {InspectedRow[]} */
+  const rows = [];
+  for (let row = 0; row < count; row++) rows.push({ particle: reader.u32(), position: reader.f32x3(), velocity: reader.f32x3(), inverseMass: reader.f32() });
+  return { kind: "inspected", ...header, rows };
 }

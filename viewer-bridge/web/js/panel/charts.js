@@ -1,67 +1,235 @@
-// The measurements: four small plots, redrawn with each STATS message, and figures below them.
+// The plots: those of the user first, those of the solver folded away. All share one axis of simulation time,
+// a cursor, and a button that holds them.
 
-import { cssColor, make, sharpContext } from "../ui/dom.js";
-import { niceCeiling } from "../geometry/round.js";
+import { find, make } from "../ui/dom.js";
 import { readable } from "../ui/format.js";
+import { sceneUnits } from "../ui/units.js";
+import { save } from "../ui/save.js";
+import { csvOf } from "./csv.js";
+import { Plot } from "./plot.js";
+import { SelectionPlots } from "./selection-plots.js";
 import { Series } from "./series.js";
 
-/** Capacity of the series: 20 s of frames, and 20 s of STATS messages (four per second). */
-const FRAME_SAMPLES = 1200;
-const STATS_SAMPLES = 80;
-
-/** @typedef {{ name: string, series: Series, color: string }} Line */
-/** @typedef {{ title: string, unit: string, lines: Line[], limit: (() => number) | null, canvas: HTMLCanvasElement, output: HTMLOutputElement, text: () => string, lastTop: number }} Chart */
+/** Capacity of the series: two minutes of frames, and of STATS messages (four per second). */
+const FRAME_SAMPLES = 7200;
+const STATS_SAMPLES = 480;
+/** Time without a sample at which a line is interrupted, in s at the pace of real time. */
+const GAP_S = 1.5;
+/** Motion of the cursor per arrow key, as a part of the window. */
+const CURSOR_STEP = 0.01;
 
 export class Charts {
-  /** @param {HTMLElement} element @param {HTMLElement} figures @param {import("../state/simulation.js").Simulation} simulation */
-  constructor(element, figures, simulation) {
-    this.simulation = simulation;
-    this.figures = figures;
-    const [solve, wake] = [new Series(FRAME_SAMPLES), new Series(FRAME_SAMPLES)];
-    const [most, mean, kinetic, potential, total] = Array.from({ length: 5 }, () => new Series(STATS_SAMPLES));
-    const stats = () => simulation.stats;
-    this.charts = [
-      chart("Solve time", "µs", [{ name: "step", series: solve, color: "--plot-a" }], () => stats()?.periodUs ?? NaN,
-        () => `${readable(stats()?.solveUsP50 ?? NaN, "µs")} of ${readable(stats()?.periodUs ?? NaN, "µs")}`),
-      chart("Wake-up delay", "µs", [{ name: "late", series: wake, color: "--plot-b" }], null,
-        () => `99 %: ${readable(stats()?.wakeLateUsP99 ?? NaN, "µs")}`),
-      chart("Stretch", "%", [{ name: "maximum", series: most, color: "--plot-b" }, { name: "mean", series: mean, color: "--plot-a" }], null,
-        () => `max ${readable(most.last(), "%")}, mean ${readable(mean.last(), "%")}`),
-      chart("Energy", "J", [{ name: "potential", series: potential, color: "--plot-c" }, { name: "kinetic", series: kinetic, color: "--plot-a" }, { name: "sum", series: total, color: "--plot-b" }], null,
-        () => `kinetic ${readable(kinetic.last(), "J")}, sum ${readable(total.last(), "J")}`),
+  /** @param {import("../tools/tool.js").App} app @param {import("../ui/banner.js").Banner} banner */
+  constructor(app, banner) {
+    this.app = app;
+    this.banner = banner;
+    this.figures = find("figures", HTMLElement);
+    this.box = find("plots", HTMLElement);
+    this.span = find("plot-span", HTMLSelectElement);
+    this.holdButton = find("plot-hold", HTMLButtonElement);
+    this.axis = find("plot-axis", HTMLOutputElement);
+    this.said = find("plot-said", HTMLElement);
+    this.series = seriesOf();
+    this.own = this.userPlots();
+    this.solver = this.solverPlots();
+    this.selected = new SelectionPlots(app, FRAME_SAMPLES);
+    /** Simulation time at the right end. */
+    this.now = 0;
+    /** The right end while the plots are held. @type {number | null} */
+    this.heldAt = null;
+    /** @type {number | null} */
+    this.cursor = null;
+    /** Plots of this round that are drawn, one per animation frame. All of a round have the same window. */
+    this.drawn = 0;
+    this.isStale = true;
+    /** @type {import("./plot.js").Window} */
+    this.round = { from: 0, to: 0, cursor: null, gap: GAP_S };
+    find("solver-plots", HTMLElement).replaceChildren(...this.solver.map((one) => one.element));
+    this.arrange();
+    this.listen();
+  }
+
+  get plots() {
+    return [...this.own, ...this.selected.plots, ...this.solver];
+  }
+
+  userPlots() {
+    const { simulation } = this.app;
+    const units = () => sceneUnits(simulation.scene);
+    const { lowest, highest, most, mean, kinetic, potential, total, torn } = this.series;
+    const plot = (/** @type {string} */ title, /** @type {() => string} */ unit, /** @type {import("./plot.js").Line[]} */ lines, fits = false) => new Plot({ title, unit, lines, fits, limit: null, text: null });
+    return [
+      plot("Height", () => units().length, [{ name: "highest", series: highest, color: "--plot-a" }, { name: "lowest", series: lowest, color: "--plot-b" }], true),
+      plot("Stretch", () => "%", [{ name: "max", series: most, color: "--plot-b" }, { name: "mean", series: mean, color: "--plot-a" }]),
+      plot("Energy", () => units().energy, [{ name: "potential", series: potential, color: "--plot-c" }, { name: "kinetic", series: kinetic, color: "--plot-a" }, { name: "sum", series: total, color: "--plot-b" }]),
+      plot("Torn", () => "", [{ name: "constraints", series: torn, color: "--plot-b" }]),
     ];
-    element.replaceChildren(...this.charts.map((one) => make("div", { class: "plot" }, make("h3", {}, one.title, one.output), one.canvas)));
-    simulation.on("frame", (frame) => {
-      solve.push(frame.solveUs);
-      wake.push(frame.wakeLateUs);
-    });
-    simulation.on("stats", (now) => {
-      most.push(now.stretchMax);
-      mean.push(now.stretchMean);
-      kinetic.push(now.kineticJ);
-      potential.push(now.potentialJ);
-      total.push(now.kineticJ + now.potentialJ);
-      this.draw();
-    });
-    for (const topic of /** @type {const} */ (["node", "connection"])) simulation.on(topic, () => { if (!simulation.isAlive) this.clear(); });
-    simulation.on("scene", () => this.charts.forEach((one) => one.lines.forEach((line) => line.series.clear())));
   }
 
-  draw() {
-    if (this.charts[0].canvas.clientWidth === 0) return;
-    for (const one of this.charts) drawChart(one);
-    this.drawFigures();
+  solverPlots() {
+    const stats = () => this.app.simulation.stats;
+    const { solve, wake } = this.series;
+    const plot = (/** @type {string} */ title, /** @type {import("./plot.js").Line} */ line, /** @type {(() => number) | null} */ limit, /** @type {() => string} */ text) => new Plot({ title, unit: () => "µs", lines: [line], fits: false, limit, text });
+    return [
+      plot("Solve time", { name: "step", series: solve, color: "--plot-a" }, () => stats()?.periodUs ?? NaN, () => `${readable(stats()?.solveUsP50 ?? NaN, "µs")} of ${readable(stats()?.periodUs ?? NaN, "µs")}`),
+      plot("Wake-up delay", { name: "late", series: wake, color: "--plot-b" }, null, () => `99 %: ${readable(stats()?.wakeLateUsP99 ?? NaN, "µs")}`),
+    ];
   }
 
-  /** Removes the numbers of a node that is gone. The plots end there. */
+  listen() {
+    const { simulation, selection } = this.app;
+    simulation.on("frame", (frame) => this.addFrame(frame));
+    simulation.on("stats", (stats) => this.addStats(stats));
+    simulation.on("scene", () => this.clear());
+    for (const topic of /** @type {const} */ (["node", "connection"])) simulation.on(topic, () => { if (!simulation.isAlive) this.figures.replaceChildren(); });
+    selection.on("change", () => this.arrange());
+    this.holdButton.addEventListener("click", () => this.hold(this.heldAt === null));
+    find("plot-csv", HTMLButtonElement).addEventListener("click", () => this.saveCsv());
+    this.span.addEventListener("change", () => this.redraw());
+    find("solver", HTMLDetailsElement).addEventListener("toggle", () => this.redraw());
+    for (const box of [this.box, find("solver-plots", HTMLElement)]) {
+      box.addEventListener("pointermove", (event) => this.point(event));
+      box.addEventListener("pointerleave", () => this.setCursor(null));
+    }
+    this.box.addEventListener("keydown", (event) => this.onKey(event));
+    this.box.addEventListener("blur", () => this.setCursor(null));
+  }
+
+  /** Puts the plots of the selection after those of the scene. */
+  arrange() {
+    this.selected.rebuild();
+    if (this.heldAt !== null) this.selected.plots.forEach((one) => one.hold(true));
+    this.box.replaceChildren(...this.own.map((one) => one.element), ...this.selected.plots.map((one) => one.element));
+    this.redraw();
+  }
+
   clear() {
-    for (const one of this.charts) one.output.textContent = "";
-    this.figures.replaceChildren();
+    for (const series of Object.values(this.series)) series.clear();
+    this.selected.clear();
+    this.hold(false);
   }
 
-  drawFigures() {
-    const { stats } = this.simulation;
-    if (stats === null) return;
+  /** @param {import("../net/wire.js").Frame} frame */
+  addFrame(frame) {
+    const { simulation } = this.app;
+    const time = frame.simTime;
+    const { low, high } = heights(frame, simulation.axes().up);
+    this.series.lowest.push(time, low);
+    this.series.highest.push(time, high);
+    this.series.torn.push(time, frame.tornCount);
+    this.series.solve.push(time, frame.solveUs);
+    this.series.wake.push(time, frame.wakeLateUs);
+    this.selected.add(time);
+    this.now = time;
+    if (this.heldAt === null) this.redraw();
+  }
+
+  /** @param {import("../net/wire.js").Stats} stats */
+  addStats(stats) {
+    const { scene } = this.app.simulation;
+    if (scene === null || stats.epoch !== scene.epoch) return;
+    const time = stats.step / Math.max(scene.rateHz, 1);
+    const { most, mean, kinetic, potential, total } = this.series;
+    most.push(time, stats.stretchMax);
+    mean.push(time, stats.stretchMean);
+    kinetic.push(time, stats.kineticJ);
+    potential.push(time, stats.potentialJ);
+    total.push(time, stats.kineticJ + stats.potentialJ);
+    this.drawFigures(stats);
+  }
+
+  /** Stops the plots, so that they can be read. Samples are still recorded. @param {boolean} isHeld */
+  hold(isHeld) {
+    this.heldAt = isHeld ? this.now : null;
+    this.holdButton.setAttribute("aria-pressed", String(isHeld));
+    for (const one of this.plots) one.hold(isHeld);
+    this.redraw();
+  }
+
+  /** @returns {import("./plot.js").Window} */
+  window() {
+    const { simulation } = this.app;
+    const to = this.heldAt ?? this.now;
+    const pace = simulation.isReplay ? simulation.playback?.rate ?? 1 : simulation.stats?.timeScale ?? 1;
+    return { from: to - Number(this.span.value), to, cursor: this.cursor, gap: GAP_S * Math.max(1, pace || 1) };
+  }
+
+  redraw() {
+    this.isStale = true;
+  }
+
+  /** Draws one plot per animation frame, so that none takes long. */
+  tick() {
+    const { plots } = this;
+    if (this.drawn >= plots.length) {
+      if (!this.isStale || document.body.classList.contains("panel-away")) return;
+      this.isStale = false;
+      this.drawn = 0;
+      this.round = this.window();
+      this.showAxis(this.round);
+    }
+    this.drawPlot(plots[this.drawn++], this.round);
+  }
+
+  /** @param {Plot} plot @param {import("./plot.js").Window} window */
+  drawPlot(plot, window) {
+    if (plot.canvas.clientWidth > 0) plot.draw(window);
+  }
+
+  /** @param {import("./plot.js").Window} window */
+  showAxis({ from, to, cursor }) {
+    const rate = this.app.simulation.scene?.rateHz ?? 1;
+    const text = cursor === null ? `${from.toFixed(2)} s to ${to.toFixed(2)} s` : `${cursor.toFixed(3)} s, step ${Math.round(cursor * rate)}`;
+    if (this.axis.textContent !== text) this.axis.textContent = text;
+  }
+
+  /** @param {PointerEvent} event */
+  point(event) {
+    const canvas = event.target instanceof Element ? event.target.closest(".plot")?.querySelector("canvas") : null;
+    if (!canvas) return;
+    const { from, to } = this.window();
+    const box = canvas.getBoundingClientRect();
+    const share = Math.min(1, Math.max(0, (event.clientX - box.left) / box.width));
+    this.setCursor(from + share * (to - from));
+  }
+
+  /** Moves the cursor with the arrow keys, and reads the values out. @param {KeyboardEvent} event */
+  onKey(event) {
+    const way = { ArrowLeft: -1, ArrowRight: 1, Escape: 0 }[event.key];
+    if (way === undefined || event.ctrlKey || event.altKey || event.metaKey) return;
+    event.preventDefault();
+    event.stopPropagation();
+    if (way === 0) return this.setCursor(null);
+    const { from, to, gap } = this.window();
+    const cursor = Math.min(to, Math.max(from, (this.cursor ?? to) + way * CURSOR_STEP * (to - from)));
+    this.setCursor(cursor);
+    this.said.textContent = `At ${cursor.toFixed(2)} s: ${[...this.own, ...this.selected.plots].map((one) => `${one.spec.title}: ${one.textAt(cursor, gap)}`).join("; ")}`;
+  }
+
+  /** @param {number | null} time */
+  setCursor(time) {
+    if (time === this.cursor) return;
+    this.cursor = time;
+    const window = this.window();
+    for (const one of this.plots) this.drawPlot(one, window);
+    this.showAxis(window);
+  }
+
+  /** All samples of the plots; of held ones, those on show. */
+  csv() {
+    const columns = this.plots.flatMap((one) => one.lines.map(({ name, series }) => ({ name: `${one.spec.title} ${name}${one.spec.unit() === "" ? "" : ` (${one.spec.unit() === "%" ? "1" : one.spec.unit()})`}`, series })));
+    return csvOf(columns, this.app.simulation.scene?.rateHz ?? 1);
+  }
+
+  saveCsv() {
+    const { simulation } = this.app;
+    if (simulation.frame === null) return this.banner.notify("The plots have no values yet.", "warning");
+    save(new Blob([this.csv()], { type: "text/csv" }), `${simulation.scene?.name || "catenary"}-${simulation.frame.step}.csv`);
+  }
+
+  /** @param {import("../net/wire.js").Stats} stats */
+  drawFigures(stats) {
+    if (this.figures.clientWidth === 0) return;
     const rows = [
       ["Real-time factor", `${stats.realTimeFactor.toFixed(2)} of ${stats.timeScale.toFixed(2)}`],
       ["Late steps, skipped", `${stats.lateSteps}, ${stats.skippedPeriods}`],
@@ -74,66 +242,17 @@ export class Charts {
   }
 }
 
-/** @param {string} title @param {string} unit @param {Line[]} lines @param {(() => number) | null} limit @param {() => string} text @returns {Chart} */
-function chart(title, unit, lines, limit, text) {
-  const label = `${title}: ${lines.map((line) => line.name).join(", ")}`;
-  return { title, unit, lines, limit, text, canvas: make("canvas", { role: "img", "aria-label": label }), output: make("output", { "aria-live": "off" }), lastTop: 0 };
+/** The series of the scene and the solver. */
+function seriesOf() {
+  const frames = () => new Series(FRAME_SAMPLES);
+  const stats = () => new Series(STATS_SAMPLES);
+  return { lowest: frames(), highest: frames(), torn: frames(), solve: frames(), wake: frames(), most: stats(), mean: stats(), kinetic: stats(), potential: stats(), total: stats() };
 }
 
-/** @param {Chart} one */
-function drawChart(one) {
-  one.output.textContent = one.text();
-  const { context, width, height } = sharpContext(one.canvas);
-  const { bottom, top } = scaleOf(one);
-  const y = (/** @type {number} */ value) => height - 4 - ((value - bottom) / (top - bottom)) * (height - 8);
-  context.lineWidth = 1;
-  if (bottom < 0) rule(context, width, y(0), cssColor("--line"), []);
-  if (one.limit !== null && one.limit() <= top) rule(context, width, y(one.limit()), cssColor("--accent"), [4, 3]);
-  for (const { series, color } of one.lines) drawLine(context, series.columns(Math.min(Math.floor(width), series.samples.length)), width, y, cssColor(color));
-  context.fillStyle = cssColor("--soft");
-  context.font = "10px system-ui, sans-serif";
-  context.fillText(readable(top, one.unit), 4, 11);
-}
-
-/** Round ends of the scale. It grows at once, and shrinks only when less than a third is used. @param {Chart} one */
-function scaleOf(one) {
-  const ranges = one.lines.map((line) => line.series.range()).filter((range) => range !== null);
-  const least = Math.min(0, ...ranges.map((range) => range.min));
-  const limit = one.limit?.() ?? NaN;
-  const greatest = Math.max(0, ...ranges.map((range) => range.max));
-  // The deadline is in range only once the solver comes near it; otherwise it would flatten the plot.
-  const wanted = niceCeiling(greatest > 0.2 * limit ? Math.max(greatest, limit * 1.1) : greatest);
-  one.lastTop = wanted > one.lastTop || wanted < one.lastTop * 0.3 ? wanted : one.lastTop;
-  return { bottom: least < 0 ? -niceCeiling(-least) : 0, top: one.lastTop };
-}
-
-/** @param {CanvasRenderingContext2D} context @param {number} width @param {number} y @param {string} color @param {number[]} dash */
-function rule(context, width, y, color, dash) {
-  context.setLineDash(dash);
-  context.strokeStyle = color;
-  context.beginPath();
-  context.moveTo(0, y);
-  context.lineTo(width, y);
-  context.stroke();
-  context.setLineDash([]);
-}
-
-/** Draws a band from minimum to maximum in each column, so that a single peak is visible. @param {CanvasRenderingContext2D} context @param {import("./series.js").Column[]} columns @param {number} width @param {(value: number) => number} y @param {string} color */
-function drawLine(context, columns, width, y, color) {
-  context.strokeStyle = color;
-  context.lineWidth = 1.4;
-  context.beginPath();
-  let isDown = false;
-  columns.forEach((column, index) => {
-    if (column === null) {
-      isDown = false;
-      return;
-    }
-    const x = ((index + 0.5) / columns.length) * width;
-    if (isDown) context.lineTo(x, y(column.max));
-    else context.moveTo(x, y(column.max));
-    context.lineTo(x, y(column.min));
-    isDown = true;
-  });
-  context.stroke();
+/** The heights of the bounding box of a frame along an axis. @param {import("../net/wire.js").Frame} frame @param {import("../geometry/math.js").Vec3} up */
+export function heights({ bounds: { min, max }, particleCount }, up) {
+  if (particleCount === 0) return { low: NaN, high: NaN };
+  const axis = up.findIndex((one) => one !== 0);
+  const ends = [min[axis] * up[axis], max[axis] * up[axis]];
+  return { low: Math.min(...ends), high: Math.max(...ends) };
 }

@@ -1,14 +1,16 @@
 // The parameter panel: each row shows the value of the node and sends changes of the user. An older
 // answer never moves a slider while the user holds it.
 
+import { KINDS } from "../state/quantity.js";
 import { find, make } from "../ui/dom.js";
-import { SLIDER_STEPS, editable, positionOf, rangeOf, restoring, rowsOf, valueAt, valueOf, vectorOf } from "./parameters.js";
+import { SLIDER_STEPS, editable, positionOf, rangeOf, restoring, rowsOf, valueAt, vectorOf } from "./parameters.js";
+import { valueOf } from "../net/messages.js";
+import { unitIn } from "../ui/units.js";
 import { ValueField } from "./value-field.js";
 
 /** @typedef {import("./parameters.js").Row} Row */
 /** @typedef {import("../net/messages.js").ParameterValue} ParameterValue */
 
-const KINDS = ["structural", "shear", "bend", "tether"];
 const AXES = ["x", "y", "z"];
 /** Wind drag set along with a wind velocity if there is none, as wind has no effect without drag: the default of scenes, in kg/m³. */
 const WIND_DRAG = 0.6;
@@ -206,7 +208,6 @@ export class Panel {
 
   /** The unit of a row, with the length unit of the scene in place of metres. @param {Row} row */
   unit(row) {
-    const length = this.simulation.scene?.unit ?? "m";
-    return length === "m" ? row.unit : row.unit.replace(/^m\b/, length);
+    return unitIn(row.unit, this.simulation.scene?.unit ?? "m");
   }
 }

@@ -2,7 +2,7 @@
 // No DOM here.
 
 import { niceCeiling } from "../geometry/round.js";
-import { toNumber } from "../net/messages.js";
+import { toNumber, valueOf } from "../net/messages.js";
 
 /** @typedef {import("../net/messages.js").Values} Values */
 /** @typedef {import("../net/messages.js").ParameterValue} ParameterValue */
@@ -73,14 +73,6 @@ export function valueAt(row, { least, most }, position) {
 export function vectorOf(value) {
   if (!Array.isArray(value)) return [0, 0, 0];
   return [toNumber(value[0]), toNumber(value[1]), toNumber(value[2])];
-}
-
-/** A parameter, for one kind of constraint if it is per kind. Null if it is off, or if each constraint has its own value.
- * @param {Values | null} values @param {string} name @param {string} kind @returns {ParameterValue} */
-export function valueOf(values, name, kind) {
-  const value = values?.[name] ?? null;
-  if (value === null || typeof value !== "object" || Array.isArray(value)) return typeof value === "string" ? toNumber(value) : value;
-  return value[kind] ?? null;
 }
 
 /** A value as text that can be edited: all digits of a 32-bit number, and "off" for none. @param {ParameterValue} value */

@@ -16,6 +16,8 @@ import { add, boxOf, dot, length, scale, subtract } from "../geometry/math.js";
 /** @typedef {import("../net/wire.js").Stats} Stats */
 /** @typedef {import("../net/wire.js").Collider} Collider */
 /** @typedef {import("../net/wire.js").Forces} Forces */
+/** @typedef {import("../net/wire.js").Speeds} Speeds */
+/** @typedef {import("../net/wire.js").Inspected} Inspected */
 /** @typedef {import("../net/messages.js").Hello} Hello */
 /** @typedef {import("../net/messages.js").NodeState} NodeState */
 /** @typedef {import("../net/messages.js").Parameters} Parameters */
@@ -51,6 +53,8 @@ export class Simulation extends Emitter {
     this.frameNumber = null;
     /** Torn constraints, in the order of tearing. @type {number[]} */
     this.torn = [];
+    /** Their causes. @type {number[]} */
+    this.tornCauses = [];
     /** Flags of the particles that are not free, as last received. @type {Map<number, number>} */
     this.pinsReceived = new Map();
     /** The same, with expected changes that the node has yet to publish. @type {Map<number, number>} */
@@ -59,8 +63,12 @@ export class Simulation extends Emitter {
     this.colliders = [];
     /** The forces of the frame, if the page has asked for them. @type {Forces | null} */
     this.forces = null;
-    /** The newest forces received: their frame follows. @type {Forces | null} */
-    this.forcesReceived = null;
+    /** The speeds of the frame, if the page has asked for them. @type {Speeds | null} */
+    this.speeds = null;
+    /** The exact states of particles in the frame, if the page has asked for any. @type {Inspected | null} */
+    this.inspected = null;
+    /** The newest messages that belong to a frame, by kind: it follows. @type {{ forces: Forces | null, speeds: Speeds | null, inspected: Inspected | null }} */
+    this.awaiting = { forces: null, speeds: null, inspected: null };
     /** @type {ArrayLike<number>} */
     this.nonFinite = [];
     /** @type {Stats | null} */
@@ -122,7 +130,9 @@ export class Simulation extends Emitter {
     if (message.kind === "frame") this.receiveFrame(message);
     else if (message.kind === "tear") this.receiveTear(message);
     else if (message.kind === "pins") this.receivePins(message);
-    else if (message.kind === "forces") this.forcesReceived = message;
+    else if (message.kind === "forces") this.awaiting.forces = message;
+    else if (message.kind === "speeds") this.awaiting.speeds = message;
+    else if (message.kind === "inspected") this.awaiting.inspected = message;
     else this.receiveColliders(message.colliders);
   }
 
@@ -132,11 +142,12 @@ export class Simulation extends Emitter {
     this.topology = new Topology(scene);
     this.frame = null;
     this.torn = [];
+    this.tornCauses = [];
     this.pinsReceived = new Map();
     this.pins = new Map();
     this.colliders = [];
-    this.forces = null;
-    this.forcesReceived = null;
+    this.forces = this.speeds = this.inspected = null;
+    this.awaiting = { forces: null, speeds: null, inspected: null };
     this.nonFinite = [];
     this.ground = null;
     this.lowest = null;
@@ -150,7 +161,10 @@ export class Simulation extends Emitter {
   receiveFrame(frame) {
     if (frame.particleCount !== this.scene?.particleCount) return;
     this.frame = frame;
-    this.forces = this.forcesReceived?.step === frame.step ? this.forcesReceived : null;
+    const { forces, speeds, inspected } = this.awaiting;
+    this.forces = forces?.step === frame.step ? forces : null;
+    this.speeds = speeds?.step === frame.step ? speeds : null;
+    this.inspected = inspected?.step === frame.step ? inspected : null;
     if (!sameNumbers(frame.nonFinite, this.nonFinite)) {
       this.nonFinite = frame.nonFinite.slice();
       this.rebuild();
@@ -162,8 +176,10 @@ export class Simulation extends Emitter {
   receiveTear(tear) {
     const isAppended = tear.first === this.torn.length;
     this.torn.length = Math.min(tear.first, this.torn.length);
+    this.tornCauses.length = this.torn.length;
     // One by one: spreading a long list as arguments overflows the stack.
     for (const constraint of tear.constraints) this.torn.push(constraint);
+    for (const cause of tear.causes) this.tornCauses.push(cause);
     if (!isAppended) return this.rebuild();
     this.topology?.remove(tear.constraints);
     this.emit("tear", undefined);

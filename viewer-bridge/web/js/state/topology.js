@@ -2,11 +2,12 @@
 // and the fan of triangles around each particle that gives its normal.
 
 import { CONSTRAINT } from "../net/wire.js";
+import { strainGains } from "./quantity.js";
 import { floatBits, nextCorner, splitPieces } from "./splits.js";
 
 /** @typedef {import("../net/wire.js").Scene} Scene */
 
-/** Words of a fan entry: two corners, the rest length to the first as f32 bits, and 0. */
+/** Words of a fan entry: two corners, the rest length to the first and the gain as f32 bits. */
 export const FAN_WORDS = 4;
 
 /** Bits of the style of a stick, as the shader reads them. */
@@ -41,6 +42,8 @@ export class Topology {
     this.indices = new Uint32Array(scene.triangles.length);
     /** Fan entries not uploaded yet. */
     this.dirtyFans = new DirtyRange();
+    /** Gains of the quantity that colours the picture; see quantity.js. @type {Float32Array} */
+    this.gains = strainGains(scene);
     this.isGone = new Uint8Array(scene.constraintCount);
     this.styles = new Uint8Array(scene.constraintCount);
     this.restore();
@@ -57,6 +60,12 @@ export class Topology {
     }
     for (let corner = 0; corner < this.fanEntries.length; corner++) this.writeFanEntry(corner);
     this.indices.set(this.scene.triangles);
+  }
+
+  /** Colours by another quantity of the constraints. @param {Float32Array} gains */
+  setGains(gains) {
+    this.gains = gains;
+    for (let corner = 0; corner < this.fanEntries.length; corner++) this.writeRestLength(corner);
   }
 
   /** Removes constraints, and splits the triangles along structural ones. @param {ArrayLike<number>} constraints */
@@ -154,11 +163,10 @@ export class Topology {
     const entry = this.fanEntries[corner] * FAN_WORDS;
     this.fans[entry] = triangles[nextCorner(corner)];
     this.fans[entry + 1] = triangles[nextCorner(nextCorner(corner))];
-    this.fans[entry + 3] = 0;
     this.writeRestLength(corner);
   }
 
-  /** Writes the rest length of the first intact constraint along an edge; 0 without one, or if the triangle is dead. @param {number} corner */
+  /** Writes the rest length and the gain of the first intact constraint along an edge; 0 without one, or if the triangle is dead. @param {number} corner */
   writeRestLength(corner) {
     // This runs for every corner of a scene at once, so it creates no views.
     const { starts, members } = this.edgeConstraints;
@@ -167,6 +175,7 @@ export class Topology {
     while (k < end && this.isGone[members[k]]) k++;
     const entry = this.fanEntries[corner];
     this.fans[entry * FAN_WORDS + 2] = k < end ? floatBits(this.scene.restLengths[members[k]]) : 0;
+    this.fans[entry * FAN_WORDS + 3] = k < end ? floatBits(this.gains[members[k]]) : 0;
     this.dirtyFans.add(entry);
   }
 }
@@ -277,14 +286,14 @@ function buildFans(scene) {
 }
 
 /**
- * The constraints that are drawn as sticks, at most `limit`: first structural, then shear, then tether.
- * Bend constraints lie along or across other sticks and would only hide them.
+ * The constraints that are drawn as sticks, at most `limit`: first structural, then shear, tether and bend.
+ * Bend constraints lie along or across other sticks and would hide them, so only the colours of kinds show them.
  * @param {Scene} scene @param {number} limit
  */
 export function drawnSticks(scene, limit) {
   /** @type {number[]} */
   const drawn = [];
-  for (const kind of [CONSTRAINT.structural, CONSTRAINT.shear, CONSTRAINT.tether]) {
+  for (const kind of [CONSTRAINT.structural, CONSTRAINT.shear, CONSTRAINT.tether, CONSTRAINT.bend]) {
     for (let i = 0; i < scene.constraintCount && drawn.length < limit; i++) {
       if (scene.constraintKinds[i] === kind) drawn.push(i);
     }

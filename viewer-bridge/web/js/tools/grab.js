@@ -13,6 +13,10 @@ const VELOCITY_MS = 80;
 /** Least duration of a measured motion, in ms: about one frame. */
 const VELOCITY_MS_MIN = 16;
 
+/** Motion in CSS pixels, and time in ms, from which a press grabs. A shorter one is a click, which changes nothing. */
+export const CLICK_PIXELS = 3;
+const CLICK_MS = 200;
+
 /** Grabs a particle. Its target is where the pointer meets the camera-facing plane through it. @implements {Tool} */
 export class GrabTool {
   /** @param {App} app @param {number} particle @param {Pixel} start */
@@ -24,9 +28,20 @@ export class GrabTool {
     this.isMoved = false;
     this.sentMs = performance.now();
     /** Recent positions of the pointer, from the start or from just before the velocity window. */
+    this.pressedMs = this.sentMs;
     this.trail = [{ ms: this.sentMs, at: start }];
     this.origin = /** @type {Vec3} */ (app.simulation.position(particle));
-    app.commands.run("grab", { particle, target: this.origin });
+    /** The node has been asked for the grab. */
+    this.isBegun = false;
+    /** The node has refused it: another client grabs the particle. */
+    this.isRefused = false;
+  }
+
+  begin() {
+    if (this.isBegun) return;
+    this.isBegun = true;
+    this.origin = this.app.simulation.position(this.particle) ?? this.origin;
+    this.app.commands.run("grab", { particle: this.particle, target: this.origin }, ({ status }) => { this.isRefused = status !== "applied"; });
   }
 
   /** @param {Pixel} to */
@@ -36,10 +51,13 @@ export class GrabTool {
     const ms = performance.now();
     this.trail.push({ ms, at: to });
     while (this.trail.length > 1 && this.trail[1].ms < ms - VELOCITY_MS) this.trail.shift();
+    if (Math.hypot(to.x - this.start.x, to.y - this.start.y) > CLICK_PIXELS) this.begin();
   }
 
   /** @param {number} nowMs */
   tick(nowMs) {
+    if (nowMs - this.pressedMs > CLICK_MS) this.begin();
+    if (!this.isBegun) return;
     if (!this.isMoved) {
       // The next motion begins now. Spread over the rest before it, it would lag behind the pointer.
       this.sentMs = nowMs;
@@ -70,6 +88,7 @@ export class GrabTool {
    * ended by then, or not have begun. So the target first moves on at the velocity of the pointer, and
    * the release follows once the node has applied that. */
   end() {
+    if (!this.isBegun) return;
     const { commands } = this.app;
     const { particle } = this;
     const velocity = this.velocity(performance.now());
@@ -85,7 +104,7 @@ export class GrabTool {
   /** Releases the particle where it is. A reset or load ends only grabs that the node applied before it,
    * and the grab may have come later. */
   cancel() {
-    this.release();
+    if (this.isBegun) this.release();
   }
 
   release() {
@@ -93,6 +112,6 @@ export class GrabTool {
   }
 
   describe() {
-    return { line: { particle: this.particle, to: this.pointer } };
+    return this.isBegun ? { line: { particle: this.particle, to: this.pointer } } : {};
   }
 }

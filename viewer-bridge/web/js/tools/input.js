@@ -3,8 +3,9 @@
 import { clamp } from "../geometry/math.js";
 import { BrushTool } from "./brush.js";
 import { CutTool } from "./cut.js";
-import { GrabTool } from "./grab.js";
+import { CLICK_PIXELS, GrabTool } from "./grab.js";
 import { togglePin } from "./pin.js";
+import { itemAt } from "./select.js";
 import { REACH, depthUnder, particleAt } from "./tool.js";
 import { ViewTool } from "./view.js";
 
@@ -43,6 +44,8 @@ export class Input {
     this.hovered = null;
     this.isHoverStale = false;
     this.longPress = 0;
+    /** The press that is a click so far. @type {Pixel | null} */
+    this.click = null;
     /** Called when a tool begins to change the simulation. */
     this.onTouch = () => {};
     this.listen();
@@ -77,12 +80,15 @@ export class Input {
     this.canvas.setPointerCapture(event.pointerId);
     clearTimeout(this.longPress);
     if (this.pointers.size > 1) {
+      this.click = null;
       // A second finger ends the tool of the first: two fingers move the view.
       this.finish();
       return;
     }
     this.tool = this.begin(event, at);
-    if (!(this.tool instanceof ViewTool)) this.onTouch();
+    const isView = this.tool instanceof ViewTool;
+    this.click = event.button === 0 && (isView || this.tool instanceof GrabTool) && (this.mode === "grab" || !this.canChange()) ? at : null;
+    if (!isView) this.onTouch();
     if (event.pointerType === "touch" && this.tool instanceof GrabTool) this.waitForLongPress(this.tool);
     this.app.renderer.isDirty = true;
   }
@@ -120,6 +126,7 @@ export class Input {
     this.isHoverStale = true;
     const before = this.pointers.get(event.pointerId);
     if (before === undefined) return;
+    if (this.click !== null && distance(this.click, at) > CLICK_PIXELS) this.click = null;
     if (this.pointers.size === 2) this.pinch(event.pointerId, before, at);
     this.pointers.set(event.pointerId, at);
     this.tool?.move(at);
@@ -140,7 +147,31 @@ export class Input {
   release(event) {
     if (!this.pointers.delete(event.pointerId)) return;
     clearTimeout(this.longPress);
+    const isHeld = this.tool instanceof GrabTool && this.tool.isBegun;
+    const click = event.type === "pointerup" && !isHeld ? this.click : null;
+    this.click = null;
     this.finish();
+    if (click !== null) this.select(click, event);
+  }
+
+  /** Selects what was clicked, and nothing else unless Shift is held. @param {Pixel} at @param {PointerEvent} event */
+  select(at, { pointerType, shiftKey }) {
+    const { selection } = this.app;
+    const isTouch = pointerType === "touch";
+    const item = itemAt(this.app, at, isTouch ? REACH.touch : REACH.mouse, isTouch);
+    if (item !== null && shiftKey) selection.toggle(item);
+    else if (item !== null) selection.set([item]);
+    else if (!shiftKey) selection.clear();
+  }
+
+  /** The particle that this page grabs, or null. */
+  get grabbed() {
+    return this.tool instanceof GrabTool && this.tool.isBegun ? this.tool.particle : null;
+  }
+
+  /** The node has refused the grab: another client has the particle. */
+  get isRefused() {
+    return this.tool instanceof GrabTool && this.tool.isRefused;
   }
 
   /** Ends the tool in use; a grab releases its particle. */

@@ -34,6 +34,9 @@ export class Controls {
     this.help = find("help-dialog", HTMLDialogElement);
     this.modes = [...find("modes", HTMLElement).querySelectorAll("button")];
     this.panelToggle = find("panel-toggle", HTMLButtonElement);
+    /** Called for the keys of the inspector. */
+    this.onInspect = () => {};
+    this.onFollow = () => {};
     this.listen();
     listenToKeys(this.keymap());
     returnFocus(input.canvas);
@@ -91,7 +94,12 @@ export class Controls {
       ArrowRight: () => this.arrow(1, 0),
       ArrowUp: () => this.arrow(0, -1),
       ArrowDown: () => this.arrow(0, 1),
-      Escape: () => this.input.finish(),
+      i: () => this.onInspect(),
+      t: () => this.onFollow(),
+      Escape: () => {
+        this.input.finish();
+        app.selection.clear();
+      },
     };
     for (let digit = 1; digit <= 9; digit++) keymap[digit] = () => this.loadNumber(digit - 1);
     return keymap;

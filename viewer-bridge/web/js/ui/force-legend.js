@@ -1,7 +1,8 @@
-// The scale of the force arrows, and the request for forces: a node computes them only while somebody reads them.
+// The scale of the force arrows.
 
 import { find } from "./dom.js";
 import { readable } from "./format.js";
+import { sceneUnits } from "./units.js";
 import { niceFloor } from "../geometry/round.js";
 
 /** Longest arrow of the legend, in CSS pixels. */
@@ -14,16 +15,12 @@ export class ForceLegend {
     this.legend = find("force-legend", HTMLElement);
     this.arrow = find("force-arrow", HTMLElement);
     this.scale = find("force-scale", HTMLOutputElement);
-    /** The bridge sends forces on this connection. */
-    this.isAsked = false;
-    app.simulation.on("connection", () => { this.isAsked = false; });
   }
 
-  /** Asks for forces or ends the request, and shows the scale at the middle of the view. */
+  /** Shows the scale at the middle of the view. */
   tick() {
-    const { simulation, renderer, commands } = this.app;
+    const { simulation, renderer } = this.app;
     const isWanted = renderer.toggles.forces && simulation.isConnected;
-    if (isWanted !== this.isAsked && commands.stream("forces", { is_on: isWanted })) this.isAsked = isWanted;
     if (this.legend.hidden === isWanted) this.legend.hidden = !isWanted;
     if (isWanted) this.show();
   }
@@ -34,7 +31,7 @@ export class ForceLegend {
     const newtonsPerPixel = camera.unitsPerPixel(camera.target, renderer.viewport) / unitsPerNewton;
     const newtons = niceFloor(LENGTH_MAX * newtonsPerPixel);
     const width = simulation.forces === null || unitsPerNewton === 0 ? 0 : newtons / newtonsPerPixel;
-    setText(this.scale, width === 0 ? absence(simulation) : readable(newtons, "N"));
+    setText(this.scale, width === 0 ? absence(simulation) : readable(newtons, sceneUnits(simulation.scene).force));
     const pixels = `${width.toFixed(1)}px`;
     if (this.arrow.style.width !== pixels) this.arrow.style.width = pixels;
   }

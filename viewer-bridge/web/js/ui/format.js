@@ -15,7 +15,7 @@ export function readable(value, unit) {
     if (Math.abs(value) < 1e-3) return `${trim(value * 1e6)} µJ`;
     if (Math.abs(value) < 1) return `${trim(value * 1e3)} mJ`;
   }
-  return `${trim(value)} ${unit}`;
+  return unit === "" ? trim(value) : `${trim(value)} ${unit}`;
 }
 
 /** Formats a number with three digits, without an exponent if possible. @param {number} value */

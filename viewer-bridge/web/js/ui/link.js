@@ -1,7 +1,9 @@
-// The fragment of the address: the token, the scene, the camera pose, and the display toggles.
+// The fragment of the address: the token, the scene, the camera pose, the colours, and the display toggles.
+
+import { QUANTITIES } from "../state/quantity.js";
 
 /** @typedef {{ target: import("../geometry/math.js").Vec3, distance: number, yaw: number, pitch: number }} CameraPose */
-/** @typedef {{ token: string | null, scene: string | null, camera: CameraPose | null, toggles: Record<string, boolean> }} Link */
+/** @typedef {{ token: string | null, scene: string | null, camera: CameraPose | null, colour: import("../state/quantity.js").Quantity, toggles: Record<string, boolean> }} Link */
 
 /** Significant digits of a pose: well below a thousandth of the picture, in any unit. */
 const DIGITS = 5;
@@ -12,7 +14,7 @@ export function parseLink(hash) {
   /** @type {Record<string, boolean>} */
   const toggles = {};
   for (const [name, value] of fields) if (name.startsWith("show.")) toggles[name.slice(5)] = value === "1";
-  return { token: fields.get("token") || null, scene: fields.get("scene") || null, camera: parsePose(fields.get("camera")), toggles };
+  return { token: fields.get("token") || null, scene: fields.get("scene") || null, camera: parsePose(fields.get("camera")), colour: QUANTITIES.find((one) => one === fields.get("colour")) ?? "strain", toggles };
 }
 
 /** Parses a pose. Returns null for anything else: a link may be truncated or edited by hand. @param {string | null} text @returns {CameraPose | null} */
@@ -32,6 +34,7 @@ export function formatLink(link) {
     const { target, distance, yaw, pitch } = link.camera;
     fields.push(`camera=${[...target, distance, yaw, pitch].map((number) => Number(number.toPrecision(DIGITS))).join(",")}`);
   }
+  if (link.colour !== "strain") fields.push(`colour=${link.colour}`);
   for (const [name, isOn] of Object.entries(link.toggles)) fields.push(`show.${encodeURIComponent(name)}=${isOn ? 1 : 0}`);
   return fields.join("&");
 }

@@ -1,18 +1,12 @@
-// The view: display toggles, strain scale, first view of a scene, saved pictures, links.
+// The view: display toggles, first view of a scene, saved pictures, links.
 
-import { find, sharpContext } from "./dom.js";
+import { find } from "./dom.js";
 import { firstViewBox, fittedBox } from "../state/framing.js";
 import { formatLink } from "./link.js";
-import { readable } from "./format.js";
-import { niceCeiling } from "../geometry/round.js";
-import { HEAT_STOPS } from "../gl/theme.js";
+import { save } from "./save.js";
 
 /** @typedef {import("./link.js").CameraPose} CameraPose */
 
-/** Least end of an automatic strain scale: below it is only rounding. */
-const HEAT_MIN = 0.002;
-/** End of an automatic scale as a multiple of the mean strain; the greatest strain limits it. */
-const HEAT_MEANS = 8;
 /** Yaw and pitch of the first view, in radians. */
 const FIRST_VIEW = { yaw: 0.42, pitch: 0.16 };
 /** Shapes that effects draw as solid bodies. */
@@ -25,8 +19,6 @@ export class Views {
   constructor(app, banner) {
     this.app = app;
     this.banner = banner;
-    this.range = find("heat-range", HTMLSelectElement);
-    this.legend = find("legend", HTMLElement);
     /** Toggles set by the user. They persist across scenes. @type {Map<string, boolean>} */
     this.chosen = new Map();
     /** The pose of a link, for the first scene only. @type {CameraPose | null} */
@@ -41,11 +33,9 @@ export class Views {
     this.resetStep = null;
     this.buttons = [...find("toggles", HTMLElement).querySelectorAll("button")];
     for (const button of this.buttons) button.addEventListener("click", () => this.toggle(button.dataset.toggle ?? ""));
-    this.range.addEventListener("change", () => this.scaleHeat());
     app.simulation.on("scene", (scene) => this.begin(scene));
     app.simulation.on("ground", () => { if (!this.isFramed) this.showFirstView(); });
     app.simulation.on("frame", () => this.follow());
-    app.simulation.on("stats", () => this.scaleHeat());
     app.simulation.on("reset", (step) => { this.resetStep = step; });
   }
 
@@ -115,7 +105,7 @@ export class Views {
       this.resetStep = null;
       if (this.isFollowing || String(this.framed) === String(this.framing())) this.frame(firstViewBox(simulation));
     }
-    if (!this.isFollowing) return;
+    if (!this.isFollowing || this.app.selection.isFollowed) return;
     const { min, max } = simulation.box();
     camera.target = [(min[0] + max[0]) / 2, (min[1] + max[1]) / 2, (min[2] + max[2]) / 2];
   }
@@ -135,23 +125,6 @@ export class Views {
       const key = /** @type {keyof typeof renderer.toggles} */ (button.dataset.toggle);
       button.setAttribute("aria-pressed", String(renderer.toggles[key]));
     }
-    this.legend.hidden = !renderer.toggles.heat;
-    this.scaleHeat();
-    renderer.isDirty = true;
-  }
-
-  /** Sets the end of the scale: the chosen value, or a round number above the measured strain. Hysteresis keeps it steady. */
-  scaleHeat() {
-    const { renderer, simulation } = this.app;
-    if (!renderer.toggles.heat) return;
-    const { stretchMax, stretchMean } = simulation.stats ?? { stretchMax: 0, stretchMean: 0 };
-    // A single edge at a pin can be stretched far more than the rest, and may exceed the scale.
-    const measured = Math.max(Math.min(stretchMax, stretchMean * HEAT_MEANS) || 0, HEAT_MIN);
-    const isFixed = this.range.value !== "auto";
-    if (isFixed) renderer.heatMax = Number(this.range.value);
-    else if (measured > renderer.heatMax || measured < renderer.heatMax * 0.3) renderer.heatMax = niceCeiling(measured);
-    find("heat-end", HTMLOutputElement).textContent = `≥ ${readable(renderer.heatMax, "%")}`;
-    drawRamp(find("ramp", HTMLCanvasElement));
     renderer.isDirty = true;
   }
 
@@ -160,11 +133,7 @@ export class Views {
     renderer.draw();
     renderer.canvas.toBlob((blob) => {
       if (blob === null) return this.banner.notify("The picture could not be saved.", "error");
-      const link = document.createElement("a");
-      link.href = URL.createObjectURL(blob);
-      link.download = `${simulation.scene?.name || "catenary"}-${simulation.frame?.step ?? 0}.png`;
-      link.click();
-      setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+      save(blob, `${simulation.scene?.name || "catenary"}-${simulation.frame?.step ?? 0}.png`);
     }, "image/png");
   }
 
@@ -174,7 +143,7 @@ export class Views {
     const { target, distance, yaw, pitch } = camera;
     const hash = formatLink({
       scene: simulation.isReplay ? null : simulation.scene?.name ?? null,
-      camera: { target, distance, yaw, pitch }, toggles: Object.fromEntries(this.chosen),
+      camera: { target, distance, yaw, pitch }, colour: this.app.renderer.coloring.quantity, toggles: Object.fromEntries(this.chosen),
     });
     history.replaceState(null, "", `#${hash}`);
     try {
@@ -184,13 +153,4 @@ export class Views {
       this.banner.notify("The link to this view is in the address bar.");
     }
   }
-}
-
-/** @param {HTMLCanvasElement} canvas */
-function drawRamp(canvas) {
-  const { context, width, height } = sharpContext(canvas);
-  const ramp = context.createLinearGradient(0, 0, width, 0);
-  HEAT_STOPS.forEach((color, stop) => ramp.addColorStop(stop / (HEAT_STOPS.length - 1), color));
-  context.fillStyle = ramp;
-  context.fillRect(0, 0, width, height);
 }

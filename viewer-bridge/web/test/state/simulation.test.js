@@ -14,7 +14,7 @@ const frame = (epoch, number, rest = {}) => ({
   kind: "frame", epoch, step: number, number, particleCount: 2, lo: [0, 0, 0], scale: [1, 1, 1],
   positions: Float32Array.from([0, 1, 0, 0, 0.5, 0]), nonFinite: new Uint32Array(0), ...rest,
 });
-const tear = (epoch, first, ...constraints) => ({ kind: "tear", epoch, first, constraints: Uint32Array.from(constraints) });
+const tear = (epoch, first, ...constraints) => ({ kind: "tear", epoch, first, constraints: Uint32Array.from(constraints), causes: new Uint8Array(constraints.length) });
 
 test("a frame of another epoch is not shown, but can be acknowledged", () => {
   const simulation = new Simulation();
@@ -52,7 +52,7 @@ test("a list of tears can have a million entries", () => {
   const simulation = new Simulation();
   simulation.receive(scene(1));
   const count = 1_000_000;
-  simulation.receive({ kind: "tear", epoch: 1, first: 0, constraints: new Uint32Array(count) });
+  simulation.receive({ kind: "tear", epoch: 1, first: 0, constraints: new Uint32Array(count), causes: new Uint8Array(count) });
   assert.equal(simulation.torn.length, count);
 });
 

@@ -1,0 +1,126 @@
+// Draws one plot: the lines of its series in a window of simulation time.
+
+import { make, sharpContext } from "../ui/dom.js";
+import { niceCeiling } from "../geometry/round.js";
+import { readable } from "../ui/format.js";
+
+/** @typedef {import("./series.js").Series} Series */
+/** @typedef {{ name: string, series: Series, color: string }} Line  colour as "#rrggbb" or a custom property */
+/** @typedef {{ from: number, to: number, cursor: number | null, gap: number }} Window  in s; samples farther apart than `gap` are not joined */
+/** A plot. `fits` leaves out zero where the values are far from it; `limit` is a line across the plot.
+ * @typedef {{ title: string, unit: () => string, lines: Line[], fits: boolean, limit: (() => number) | null, text: (() => string) | null }} PlotSpec */
+
+export class Plot {
+  /** @param {PlotSpec} spec */
+  constructor(spec) {
+    this.spec = spec;
+    this.canvas = make("canvas", { "aria-hidden": "true" });
+    this.output = make("output", { "aria-live": "off" });
+    this.element = make("div", { class: "plot" }, make("h3", {}, spec.title, this.output), this.canvas);
+    this.lastTop = 0;
+    /** The lines while the plots are held: copies. @type {Line[] | null} */
+    this.held = null;
+  }
+
+  get lines() {
+    return this.held ?? this.spec.lines;
+  }
+
+  /** @param {boolean} isHeld */
+  hold(isHeld) {
+    this.held = isHeld ? this.spec.lines.map((line) => ({ ...line, series: line.series.clone() })) : null;
+  }
+
+  /** The values at a time, with the names of the lines. @param {number} time @param {number} reach */
+  textAt(time, reach) {
+    return this.lines.map(({ name, series }) => `${name} ${readable(series.near(time, reach), this.spec.unit())}`).join(", ");
+  }
+
+  /** @param {Window} window */
+  draw({ from, to, cursor, gap }) {
+    const text = cursor !== null ? this.textAt(cursor, gap) : this.held === null && this.spec.text !== null ? this.spec.text() : this.textAt(to, Infinity);
+    if (this.output.textContent !== text) this.output.textContent = text;
+    const { context, width, height } = sharpContext(this.canvas);
+    const style = getComputedStyle(this.canvas);
+    const color = (/** @type {string} */ name) => (name.startsWith("--") ? style.getPropertyValue(name) : name);
+    const { bottom, top } = this.scale(from, to);
+    const y = (/** @type {number} */ value) => height - 4 - ((value - bottom) / (top - bottom)) * (height - 8);
+    const limit = this.spec.limit?.() ?? NaN;
+    context.lineWidth = 1;
+    if (bottom < 0 && top > 0) rule(context, 0, y(0), width, y(0), color("--line"), []);
+    if (limit <= top) rule(context, 0, y(limit), width, y(limit), color("--accent"), [4, 3]);
+    for (const line of this.lines) drawLine(context, line.series, { from, to, cursor, gap }, width, y, color(line.color));
+    if (cursor !== null) {
+      const x = ((cursor - from) / (to - from)) * width;
+      rule(context, x, 0, x, height, color("--text"), []);
+    }
+    context.fillStyle = color("--soft");
+    context.font = "10px system-ui, sans-serif";
+    context.fillText(readable(top, this.spec.unit()), 4, 11);
+    if (bottom !== 0) context.fillText(readable(bottom, this.spec.unit()), 4, height - 4);
+  }
+
+  /** Round ends of the scale. It grows at once, and shrinks only when less than a third is used. @param {number} from @param {number} to */
+  scale(from, to) {
+    let [least, greatest] = [Infinity, -Infinity];
+    for (const { series } of this.lines) {
+      const range = series.range(from, to);
+      if (range === null) continue;
+      least = Math.min(least, range.min);
+      greatest = Math.max(greatest, range.max);
+    }
+    if (least > greatest) return { bottom: 0, top: 1 };
+    if (this.spec.fits) {
+      const step = niceCeiling(Math.max(greatest - least, Math.abs(greatest) * 1e-4) / 4);
+      return { bottom: Math.floor(least / step) * step, top: Math.ceil(greatest / step + 1e-9) * step || step };
+    }
+    const limit = this.spec.limit?.() ?? NaN;
+    // A limit is in range only once the values come near it; otherwise it would flatten the plot.
+    const wanted = niceCeiling(greatest > 0.2 * limit ? Math.max(greatest, limit * 1.1) : Math.max(greatest, 0));
+    this.lastTop = wanted > this.lastTop || wanted < this.lastTop * 0.3 ? wanted : this.lastTop;
+    return { bottom: least < 0 ? -niceCeiling(-least) : 0, top: this.lastTop };
+  }
+}
+
+/** @param {CanvasRenderingContext2D} context @param {number} x @param {number} y @param {number} toX @param {number} toY @param {string} color @param {number[]} dash */
+function rule(context, x, y, toX, toY, color, dash) {
+  context.setLineDash(dash);
+  context.strokeStyle = color;
+  context.beginPath();
+  context.moveTo(x, y);
+  context.lineTo(toX, toY);
+  context.stroke();
+  context.setLineDash([]);
+}
+
+/** Draws from the maximum to the minimum of the samples in each column of pixels, so that a single peak is visible.
+ * @param {CanvasRenderingContext2D} context @param {Series} series @param {Window} window @param {number} width @param {(value: number) => number} y @param {string} color */
+export function drawLine(context, series, { from, to, gap }, width, y, color) {
+  context.strokeStyle = color;
+  context.lineWidth = 1.4;
+  context.beginPath();
+  let [column, min, max, before, isDown] = [-1, Infinity, -Infinity, -Infinity, false];
+  const flush = () => {
+    if (min > max) return;
+    if (isDown) context.lineTo(column + 0.5, y(max));
+    else context.moveTo(column + 0.5, y(max));
+    context.lineTo(column + 0.5, y(min) + (min === max && !isDown ? 1 : 0));
+    isDown = true;
+  };
+  for (let index = Math.max(series.indexFrom(from) - 1, 0); index < series.size; index++) {
+    const time = series.timeAt(index);
+    if (time > to) break;
+    const value = series.valueAt(index);
+    const at = Math.floor(((time - from) / (to - from)) * width);
+    const isBroken = Number.isNaN(value) || time - before > gap;
+    if (at !== column || isBroken) {
+      flush();
+      [column, min, max] = [at, Infinity, -Infinity];
+      if (isBroken) isDown = false;
+    }
+    if (!Number.isNaN(value)) [min, max] = [Math.min(min, value), Math.max(max, value)];
+    before = time;
+  }
+  flush();
+  context.stroke();
+}

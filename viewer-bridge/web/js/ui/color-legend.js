@@ -1,0 +1,221 @@
+// The legend of the colours: the choice of the quantity, its scale, its extremes, and what is not known.
+
+import { find, make, sharpContext } from "./dom.js";
+import { readable } from "./format.js";
+import { sceneUnits } from "./units.js";
+import { niceCeiling } from "../geometry/round.js";
+import { HEAT_STOPS, KIND_COLORS } from "../gl/theme.js";
+import { KINDS, strainGains, tensionGains } from "../state/quantity.js";
+import { ValueScan } from "../state/value-scan.js";
+
+/** @typedef {import("../state/quantity.js").Quantity} Quantity */
+/** @typedef {import("../state/value-scan.js").Extremes} Extremes */
+
+/** Time between two scans of a moving scene, in ms. */
+const SCAN_INTERVAL_MS = 250;
+/** Least end of an automatic scale of the strain: below it is only rounding. */
+const STRAIN_MIN = 0.002;
+/** Least end of an automatic scale of the speed: a scene at rest is not coloured by its noise. In radii of the scene per second. */
+const SPEED_MIN_RADII = 0.005;
+/** Ends that a user can choose, in the unit of the quantity. @type {Record<Quantity, number[]>} */
+const ENDS = { strain: [0.01, 0.05, 0.2, 1], tension: [0.1, 1, 10, 100], speed: [0.1, 1, 10], kind: [] };
+/** The rounding of positions is mentioned from this part of the scale on. */
+const RESOLUTION_SHARE = 0.05;
+
+export class ColorLegend {
+  /** @param {import("../tools/tool.js").App} app */
+  constructor(app) {
+    this.app = app;
+    this.element = find("legend", HTMLElement);
+    this.choice = find("colour", HTMLSelectElement);
+    this.range = find("heat-range", HTMLSelectElement);
+    this.ramp = find("ramp", HTMLCanvasElement);
+    this.ends = find("heat-ends", HTMLElement);
+    this.extremes = find("heat-extremes", HTMLOutputElement);
+    this.kinds = find("heat-kinds", HTMLElement);
+    this.note = find("heat-note", HTMLElement);
+    this.scan = new ValueScan();
+    this.begunMs = -Infinity;
+    /** The end of the automatic scale. */
+    this.end = 0;
+    /** The frame of the last scan: a paused scene is scanned once. @type {object | null} */
+    this.scanned = null;
+    /** What the gains of the topology were computed from. */
+    this.gainsFor = "";
+    /** Speeds of the scanned frame. @type {import("../net/wire.js").Speeds | null} */
+    this.speeds = null;
+    this.isShown = false;
+    this.choice.addEventListener("change", () => this.choose(/** @type {Quantity} */ (this.choice.value)));
+    this.range.addEventListener("change", () => this.fit());
+    const { simulation } = app;
+    simulation.on("scene", () => this.begin());
+    for (const topic of /** @type {const} */ (["parameters", "node"])) simulation.on(topic, () => this.updateGains());
+    // The next scan leaves out what is torn.
+    simulation.on("tear", () => { this.scanned = null; });
+  }
+
+  get quantity() {
+    return this.app.renderer.coloring.quantity;
+  }
+
+  /** Colours by another quantity. @param {Quantity} quantity */
+  choose(quantity) {
+    this.app.renderer.coloring.quantity = quantity;
+    this.choice.value = quantity;
+    this.begin();
+  }
+
+  /** Starts with another scene or quantity. */
+  begin() {
+    const { quantity } = this;
+    this.end = 0;
+    this.gainsFor = "";
+    this.range.replaceChildren(make("option", { value: "auto" }, "auto"), ...ENDS[quantity].map((end) => make("option", { value: end }, `${quantity === "speed" ? "to" : "±"} ${readable(end, this.unit())}`)));
+    this.range.hidden = quantity === "kind";
+    this.updateGains();
+    this.rescan();
+    this.isShown = false;
+  }
+
+  /** Unit of the quantity. */
+  unit() {
+    const units = sceneUnits(this.app.simulation.scene);
+    return { strain: "%", tension: units.force, speed: units.speed, kind: "" }[this.quantity];
+  }
+
+  /** Gives the topology the gains of the quantity, if they have changed. */
+  updateGains() {
+    const { simulation, renderer } = this.app;
+    const { topology, scene, node, parameters } = simulation;
+    if (topology === null || scene === null || !renderer.toggles.heat) return;
+    const isTension = this.quantity === "tension";
+    const key = isTension ? JSON.stringify([scene.epoch, node?.method, parameters?.values?.compliance]) : `${scene.epoch}`;
+    if (key === this.gainsFor || (this.quantity !== "strain" && !isTension)) return;
+    this.gainsFor = key;
+    topology.setGains(isTension ? tensionGains(scene, parameters?.values ?? null, node?.method ?? null) : strainGains(scene));
+    renderer.invalidate({ topology: true });
+    this.rescan();
+  }
+
+  rescan() {
+    this.scan.restart();
+    this.scanned = null;
+    this.begunMs = -Infinity;
+  }
+
+  /** Scans the values, and shows what has changed. @param {number} nowMs */
+  tick(nowMs) {
+    const { renderer, simulation } = this.app;
+    const isWanted = renderer.toggles.heat && simulation.scene !== null;
+    if (this.element.hidden === isWanted) this.element.hidden = !isWanted;
+    if (!isWanted) {
+      this.isShown = false;
+      return;
+    }
+    if (!this.isShown) {
+      this.isShown = true;
+      this.choice.value = this.quantity;
+      this.updateGains();
+      this.show();
+    }
+    if (this.quantity !== "kind") this.scanSome(nowMs);
+  }
+
+  /** @param {number} nowMs */
+  scanSome(nowMs) {
+    const { scan } = this;
+    const { frame, scene, topology, speeds } = this.app.simulation;
+    if (frame === null || scene === null || topology === null) return;
+    if (!scan.isRunning) {
+      if (nowMs - this.begunMs < SCAN_INTERVAL_MS || this.scanned === frame || (this.quantity === "speed" && speeds === null)) return;
+      this.begunMs = nowMs;
+      this.scanned = frame;
+      this.speeds = speeds;
+      scan.begin(frame);
+    }
+    const isDone = this.quantity === "speed" ? scan.addValues(this.speeds?.speeds ?? new Float32Array(0)) : scan.addConstraints(scene, topology.gains, topology.isGone);
+    if (isDone) this.fit();
+  }
+
+  /** Sets the ends of the scale: those chosen, or a round number above 98 of 100 values. Hysteresis keeps them steady. */
+  fit() {
+    const { coloring } = this.app.renderer;
+    const measured = Math.max(this.scan.found?.most ?? 0, this.least());
+    if (measured > this.end || measured < this.end * 0.3) this.end = niceCeiling(measured);
+    const end = this.range.value === "auto" ? this.end : Number(this.range.value);
+    const low = this.quantity === "speed" ? 0 : -end;
+    if (coloring.low !== low || coloring.high !== end) this.app.renderer.isDirty = true;
+    coloring.low = low;
+    coloring.high = end;
+    this.show();
+  }
+
+  /** Least end of an automatic scale. */
+  least() {
+    if (this.quantity === "strain") return STRAIN_MIN;
+    return this.quantity === "speed" ? SPEED_MIN_RADII * this.app.simulation.radius() : 0;
+  }
+
+  show() {
+    const { quantity } = this;
+    const isKind = quantity === "kind";
+    for (const one of [this.ramp, this.ends, this.extremes]) one.hidden = isKind;
+    this.kinds.hidden = !isKind;
+    setText(this.note, isKind ? "" : this.doubt());
+    this.note.hidden = this.note.textContent === "";
+    if (isKind) return this.showKinds();
+    const { low, high } = this.app.renderer.coloring;
+    const unit = this.unit();
+    const [first, middle, last] = this.ends.children;
+    setText(first, low === 0 ? "0" : `${readable(low, unit)}`);
+    setText(middle, low === 0 ? "" : "0");
+    setText(last, readable(high, unit));
+    const { found } = this.scan;
+    if (found !== null) setText(this.extremes, found.known === 0 ? "no known value" : `min ${readable(found.min, unit)}, max ${readable(found.max, unit)}`);
+    else setText(this.extremes, "");
+    drawRamp(this.ramp);
+  }
+
+  /** What the colours do not show, or "". */
+  doubt() {
+    const { found } = this.scan;
+    const { quantity } = this;
+    if (quantity === "speed" || found === null) return "";
+    const rounding = found.resolution > RESOLUTION_SHARE * this.app.renderer.coloring.high ? ` Positions are rounded: ±${readable(found.resolution, this.unit())}.` : "";
+    return `${quantity === "tension" ? tensionNote(found, this.app.simulation.node?.method ?? null) : ""}${rounding}`.trim();
+  }
+
+  showKinds() {
+    const { scene } = this.app.simulation;
+    const counts = KINDS.map(() => 0);
+    for (const kind of scene?.constraintKinds ?? []) counts[kind]++;
+    this.kinds.replaceChildren(...KINDS.flatMap((name, kind) => {
+      if (counts[kind] === 0) return [];
+      const swatch = make("i", { "aria-hidden": "true" });
+      swatch.style.background = KIND_COLORS[kind];
+      return [make("li", {}, swatch, `${name}: ${counts[kind]}`)];
+    }));
+  }
+}
+
+/** Says of which constraints the tension is known. @param {Extremes} found @param {string | null} method */
+export function tensionNote({ known, count }, method) {
+  if (method === "pbd") return "The method pbd has no forces: tensions are not defined.";
+  const law = "(length − rest length) / compliance: exact at rest.";
+  if (known === 0) return "All constraints are rigid: positions do not show their tensions. Set a compliance, or show forces (N).";
+  return known < count ? `${law} Rigid or torn, so unknown: ${count - known} of ${count} constraints.` : law;
+}
+
+/** @param {Element} element @param {string} text */
+function setText(element, text) {
+  if (element.textContent !== text) element.textContent = text;
+}
+
+/** @param {HTMLCanvasElement} canvas */
+function drawRamp(canvas) {
+  const { context, width, height } = sharpContext(canvas);
+  const ramp = context.createLinearGradient(0, 0, width, 0);
+  HEAT_STOPS.forEach((color, stop) => ramp.addColorStop(stop / (HEAT_STOPS.length - 1), color));
+  context.fillStyle = ramp;
+  context.fillRect(0, 0, width, height);
+}
