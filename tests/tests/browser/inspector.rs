@@ -1,5 +1,5 @@
 //! The inspector and its plots: a click selects and changes nothing, values are those of the node, and the
-//! table has what the plots show.
+//! table holds the values of the plots.
 
 use std::time::Duration;
 

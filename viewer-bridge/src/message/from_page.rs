@@ -43,7 +43,7 @@ pub struct Hello {
     pub format: Choice,
 }
 
-/// What a page wants to know of each frame besides the positions, from now on.
+/// A wish of a page: values of each frame besides the positions, from now on.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 #[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Wish {

@@ -29,7 +29,7 @@ impl Credit {
     }
 }
 
-/// What a page has asked for besides the positions.
+/// Values besides the positions that a page has asked for.
 #[derive(Debug, Default)]
 pub(crate) struct Wishes {
     /// The forces of each step.

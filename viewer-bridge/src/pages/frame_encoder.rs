@@ -11,7 +11,7 @@ use crate::wire::{
     encode_frame,
 };
 
-/// What pages want to know of a state besides the positions.
+/// Values of a state besides the positions that pages want.
 #[derive(Debug, Default)]
 pub(super) struct Wanted {
     pub(super) speeds: bool,

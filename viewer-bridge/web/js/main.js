@@ -3,11 +3,11 @@
 import { Banner, sentence } from "./ui/banner.js";
 import { Camera } from "./geometry/camera.js";
 import { Charts } from "./panel/charts.js";
-import { ColorLegend } from "./ui/color-legend.js";
+import { ColorLegend } from "./legend/color-legend.js";
 import { Commands } from "./net/commands.js";
 import { Controls } from "./ui/controls.js";
 import { find } from "./ui/dom.js";
-import { ForceLegend } from "./ui/force-legend.js";
+import { ForceLegend } from "./legend/force-legend.js";
 import { Renderer } from "./gl/renderer.js";
 import { Hud } from "./ui/hud.js";
 import { Input } from "./tools/input.js";

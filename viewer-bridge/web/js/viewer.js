@@ -4,7 +4,7 @@ import { inspectItem } from "./state/inspection.js";
 
 /**
  * @typedef {{
- *   app: import("./tools/tool.js").App, colorLegend: import("./ui/color-legend.js").ColorLegend, charts: import("./panel/charts.js").Charts, connector: import("./net/socket.js").Connector,
+ *   app: import("./tools/tool.js").App, colorLegend: import("./legend/color-legend.js").ColorLegend, charts: import("./panel/charts.js").Charts, connector: import("./net/socket.js").Connector,
  *   banner: import("./ui/banner.js").Banner, input: import("./tools/input.js").Input, faults: string[],
  *   scriptMs: () => number,
  * }} Parts
@@ -38,7 +38,7 @@ export function createViewer({ app, colorLegend, charts, connector, banner, inpu
     /** The drawn force arrows, in N, and their length per newton. */
     get arrows() { return renderer.arrowsDrawn.map(({ from, force, ...which }) => ({ ...which, from: [...from], force: [...force] })); },
     get unitsPerNewton() { return renderer.unitsPerNewton(); },
-    /** What the colours show, the ends of the scale, and the extremes once they are known. */
+    /** The quantity that the colours show, the ends of the scale, and the extremes once they are known. */
     get coloring() { return { ...renderer.coloring, ...colorLegend.scan.found }; },
     /** The plots in their order, with what each says now. */
     get plots() { return charts.plots.map(({ spec, output }) => ({ title: spec.title, text: output.textContent })); },

@@ -56,7 +56,7 @@ export class Renderer {
     this.isDark = false;
     /** CSS pixels of the canvas. */
     this.viewport = { width: 1, height: 1 };
-    /** What the colours show, and the values at both ends of the ramp. @type {{ quantity: import("../state/quantity.js").Quantity, low: number, high: number }} */
+    /** The quantity that the colours show, and its values at both ends of the ramp. @type {{ quantity: import("../state/quantity.js").Quantity, low: number, high: number }} */
     this.coloring = { quantity: "strain", low: -0.05, high: 0.05 };
     /** @type {Toggles} */
     this.toggles = { surface: true, sticks: false, particles: false, pins: true, heat: false, shadow: true, forces: false, effects: !isSoftware(rendererName(gl)) };
@@ -215,7 +215,7 @@ export class Renderer {
     this.stale = { topology: false, particles: false, marks: false, colliders: false, poles: false };
   }
 
-  /** What the shaders colour by. Speeds that have not arrived yet are not drawn. */
+  /** The quantity that the shaders colour by. Speeds that have not arrived yet are not drawn. */
   paint() {
     if (!this.toggles.heat) return PAINT.off;
     const { quantity } = this.coloring;

@@ -53,7 +53,7 @@ export function distanceOf(simulation, a, b) {
   return from === null || to === null ? null : length(subtract(to, from));
 }
 
-/** Who holds a particle. @param {number} flags @param {boolean} isOurs this page grabs it */
+/** Names the holders of a particle. @param {number} flags @param {boolean} isOurs this page grabs it */
 export function holderOf(flags, isOurs) {
   const holders = [];
   if (flags & PIN.frozen) holders.push("frozen: its state was not finite");

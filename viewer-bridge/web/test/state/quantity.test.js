@@ -5,7 +5,7 @@ import { test } from "node:test";
 import { complianceOf, strainGains, tensionGains, valueAt } from "../../js/state/quantity.js";
 import { ValueScan } from "../../js/state/value-scan.js";
 import { Topology, FAN_WORDS } from "../../js/state/topology.js";
-import { tensionNote } from "../../js/ui/color-legend.js";
+import { tensionNote } from "../../js/legend/color-legend.js";
 import { unitIn, unitsOf } from "../../js/ui/units.js";
 
 /** Constraints along the x axis from particle 0, with given lengths. */

@@ -1,8 +1,8 @@
 // The scale of the force arrows.
 
-import { find } from "./dom.js";
-import { readable } from "./format.js";
-import { sceneUnits } from "./units.js";
+import { find } from "../ui/dom.js";
+import { readable } from "../ui/format.js";
+import { sceneUnits } from "../ui/units.js";
 import { niceFloor } from "../geometry/round.js";
 
 /** Longest arrow of the legend, in CSS pixels. */

@@ -1,8 +1,8 @@
 // The legend of the colours: the choice of the quantity, its scale, its extremes, and what is not known.
 
-import { find, make, sharpContext } from "./dom.js";
-import { readable } from "./format.js";
-import { sceneUnits } from "./units.js";
+import { find, make, sharpContext } from "../ui/dom.js";
+import { readable } from "../ui/format.js";
+import { sceneUnits } from "../ui/units.js";
 import { niceCeiling } from "../geometry/round.js";
 import { HEAT_STOPS, KIND_COLORS } from "../gl/theme.js";
 import { KINDS, strainGains, tensionGains } from "../state/quantity.js";
@@ -40,7 +40,7 @@ export class ColorLegend {
     this.end = 0;
     /** The frame of the last scan: a paused scene is scanned once. @type {object | null} */
     this.scanned = null;
-    /** What the gains of the topology were computed from. */
+    /** The inputs from which the gains of the topology were computed. */
     this.gainsFor = "";
     /** Speeds of the scanned frame. @type {import("../net/wire.js").Speeds | null} */
     this.speeds = null;
@@ -176,7 +176,7 @@ export class ColorLegend {
     drawRamp(this.ramp);
   }
 
-  /** What the colours do not show, or "". */
+  /** Names what the colours do not show, or returns "". */
   doubt() {
     const { found } = this.scan;
     const { quantity } = this;
