@@ -19,7 +19,7 @@ import { Panel } from "./panel/panel.js";
 import { Connector } from "./net/socket.js";
 import { Selection } from "./state/selection.js";
 import { Simulation } from "./state/simulation.js";
-import { TimelineBar } from "./ui/timeline-bar.js";
+import { TimelineBar } from "./timeline/timeline-bar.js";
 import { createViewer } from "./viewer.js";
 import { Views } from "./ui/views.js";
 import { Wishes } from "./state/wishes.js";

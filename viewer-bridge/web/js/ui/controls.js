@@ -16,7 +16,7 @@ const KEY_ZOOM = 1.2;
 export class Controls {
   /**
    * @param {import("../tools/tool.js").App} app @param {import("../tools/input.js").Input} input
-   * @param {import("./views.js").Views} views @param {import("./timeline-bar.js").TimelineBar} timeline
+   * @param {import("./views.js").Views} views @param {{ step(count: number): void }} timeline
    * @param {import("./banner.js").Banner} banner
    */
   constructor(app, input, views, timeline, banner) {

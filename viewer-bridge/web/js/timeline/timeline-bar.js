@@ -1,6 +1,6 @@
 // The timeline of a recording: marks, scrubbing and playback. Positions are steps, as in commands.
 
-import { cssColor, enable, find, make, sharpContext } from "./dom.js";
+import { cssColor, enable, find, make, sharpContext } from "../ui/dom.js";
 import { Scale, SeekGate, clockText, marksByPixel } from "./timeline.js";
 
 /** Rates to choose from; a different rate set by another page is added. */
