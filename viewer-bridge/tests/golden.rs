@@ -15,13 +15,15 @@ use sim_contract::{
 };
 use sim_solver::scene::ColliderMesh;
 use viewer_bridge::message::{
-    Choice, FromPage, Hashes, Level, Mark, MarkKind, Mode, Node, NodeState, OutcomeText,
-    PageLimits, ParametersText, Playback, Refusal, Status, Timeline, ToPage, Welcome,
+    Choice, FromPage, Hashes, HistoryText, Level, Mark, MarkKind, Mode, Node, NodeState,
+    OutcomeText, PageLimits, ParametersText, Playback, Refusal, Status, Timeline, ToPage, Undoable,
+    Welcome,
 };
 use viewer_bridge::scene::catalog::Catalog;
 use viewer_bridge::wire::{
-    Bounds, Colliders, Forces, Format, FrameHead, FrameLimits, Message, Percentiles, Pins, Scene,
-    SceneText, ShapeText, Stamp, Statistics, Tear, decode, encode_frame, frame_flag, scene_flag,
+    Bounds, Colliders, Forces, Format, FrameHead, FrameLimits, Message, Past, Percentiles, Pins,
+    Scene, SceneText, ShapeText, Stamp, Statistics, Tear, decode, encode_frame, frame_flag,
+    scene_flag,
 };
 
 const STAMP: Stamp = Stamp { epoch: 3, step: 1200 };
@@ -177,6 +179,7 @@ fn messages() -> Vec<(&'static str, Vec<u8>)> {
         ("statistics", statistics().encode().to_vec()),
         ("colliders", colliders().encode().to_vec()),
         ("forces", forces().encode().to_vec()),
+        ("past", Past { stamp: STAMP, count: 4 }.encode().to_vec()),
     ]
 }
 
@@ -237,6 +240,9 @@ fn fields(message: &Message) -> Value {
                 "rotation": one.rotation, "a": one.a, "b": one.b,
                 "velocity": one.velocity, "angular_velocity": one.angular_velocity,
             })).collect::<Vec<_>>(),
+        }),
+        Message::Past(past) => json!({
+            "kind": 9, "epoch": past.stamp.epoch, "step": past.stamp.step, "count": past.count,
         }),
         Message::Forces(all) => json!({
             "kind": 8, "epoch": all.stamp.epoch, "step": all.stamp.step,
@@ -342,6 +348,7 @@ fn to_page() -> Vec<ToPage> {
         rejected: 1,
         reason: Some(Reason::AlreadyTorn.into()),
         text: "the constraint is already torn".to_owned(),
+        state_step: None,
     };
     let parameters = ParameterValues { tear_force: Some(20.0), ..ParameterValues::default() };
     vec![
@@ -386,6 +393,13 @@ fn to_page() -> Vec<ToPage> {
         ToPage::Reset { step: 1300 },
         ToPage::Clients { count: 2 },
         ToPage::Notice { level: Level::Warning, text: "look".to_owned() },
+        ToPage::History(HistoryText {
+            first_step: Some(1200),
+            marks: vec![Mark { kind: MarkKind::Tear, step: 1234, count: 3 }],
+            text: String::new(),
+        }),
+        ToPage::Undoable { what: Some(Undoable::Cut) },
+        ToPage::Undoable { what: None },
     ]
 }
 
@@ -416,7 +430,7 @@ fn to_page_of_a_replay() -> Vec<ToPage> {
 }
 
 /// One message of each kind that a page may send.
-const FROM_PAGE: [&str; 27] = [
+const FROM_PAGE: [&str; 31] = [
     r#"{"type":"hello","protocol":2,"token":"00","format":"u16"}"#,
     r#"{"type":"hello","protocol":2}"#,
     r#"{"type":"ack","frame":77}"#,
@@ -428,7 +442,7 @@ const FROM_PAGE: [&str; 27] = [
     r#"{"type":"push","center":[0,1,0],"radius":0.3,"delta":[0,0,0.02],"limit":0.05}"#,
     r#"{"type":"pin","particle":3}"#,
     r#"{"type":"unpin","particle":3}"#,
-    r#"{"type":"cut","epoch":3,"constraints":[1,2,3],"id":2}"#,
+    r#"{"type":"cut","epoch":3,"constraints":[1,2,3],"stroke":5,"id":2}"#,
     r#"{"type":"cut_segment","from":[-1,0,0],"to":[1,0,0],"direction":[0,0,1]}"#,
     r#"{"type":"cut_radius","center":[0,0,0],"radius":0.1}"#,
     r#"{"type":"move_collider","collider":0,"translation":[0.5,0,0],"rotation":[0,0.6,0,0.8]}"#,
@@ -441,6 +455,10 @@ const FROM_PAGE: [&str; 27] = [
     r#"{"type":"set","parameter":"gravity","value":[0,-1.62,0]}"#,
     r#"{"type":"set","parameter":"tear_force","value":null}"#,
     r#"{"type":"set","parameter":"compliance","value":0.0001,"constraint_kind":"shear"}"#,
+    r#"{"type":"look","step":1200,"toward":"after"}"#,
+    r#"{"type":"rewind","to_step":1200}"#,
+    r#"{"type":"undo"}"#,
+    r#"{"type":"undo","takes_others":true,"id":3}"#,
     r#"{"type":"seek","step":1200}"#,
     r#"{"type":"rate","value":0.5}"#,
     r#"{"type":"loop","is_on":true}"#,

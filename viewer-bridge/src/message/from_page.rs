@@ -6,6 +6,8 @@ use serde_json::{Map, Value};
 use sim_contract::{GRAB_OVER_S_DEFAULT, KindFilter, ParameterValue};
 use thiserror::Error;
 
+use super::timeline::Toward;
+
 /// A message from a page.
 #[derive(Debug, Clone, PartialEq)]
 pub enum FromPage {
@@ -102,6 +104,8 @@ pub enum Command {
     Cut {
         epoch: u32,
         constraints: Vec<u32>,
+        #[serde(default)]
+        stroke: Option<u32>,
     },
     CutSegment {
         from: [f32; 3],
@@ -142,6 +146,18 @@ pub enum Command {
     },
     Mark {
         text: String,
+    },
+    Look {
+        step: u64,
+        #[serde(default)]
+        toward: Toward,
+    },
+    Rewind {
+        to_step: u64,
+    },
+    Undo {
+        #[serde(default)]
+        takes_others: bool,
     },
     Seek {
         step: u64,
@@ -188,6 +204,9 @@ impl Command {
             Self::Reset {} => "reset",
             Self::Load { .. } => "load",
             Self::Mark { .. } => "mark",
+            Self::Look { .. } => "look",
+            Self::Rewind { .. } => "rewind",
+            Self::Undo { .. } => "undo",
             Self::Set { .. } => "set",
             Self::Seek { .. } => "seek",
             Self::Rate { .. } => "rate",

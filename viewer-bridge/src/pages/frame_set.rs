@@ -23,6 +23,15 @@ pub(crate) struct FrameSet {
     pub(crate) forces: Option<Bytes>,
 }
 
+impl FrameSet {
+    /// Size of all messages.
+    pub(super) fn size_bytes(&self) -> usize {
+        let colliders = self.colliders.as_ref().map(|colliders| &colliders.bytes);
+        let messages = [self.f32.as_ref(), self.u16.as_ref(), colliders, self.forces.as_ref()];
+        messages.into_iter().flatten().map(Bytes::len).sum()
+    }
+}
+
 /// The colliders of a state.
 #[derive(Debug, Clone)]
 pub(crate) struct ColliderSet {

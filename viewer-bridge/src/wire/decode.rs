@@ -5,6 +5,7 @@ use super::decode_error::DecodeError;
 use super::forces::Forces;
 use super::frame::{self, Format, Frame};
 use super::header::{KIND_VERSION, Kind, Stamp};
+use super::past::Past;
 use super::scene::Scene;
 use super::small::{Colliders, Pins, Tear};
 use super::statistics::Statistics;
@@ -26,6 +27,8 @@ pub enum Message {
     Colliders(Colliders),
     /// The impulses of a step.
     Forces(Forces),
+    /// The head of an earlier state.
+    Past(Past),
 }
 
 /// Decodes one message.
@@ -57,6 +60,8 @@ pub fn decode(bytes: &[u8]) -> Result<Message, DecodeError> {
         Message::Colliders(Colliders::decode(stamp, &mut cursor)?)
     } else if is(Kind::Forces) {
         Message::Forces(Forces::decode(stamp, &mut cursor)?)
+    } else if is(Kind::Past) {
+        Message::Past(Past::decode(stamp, &mut cursor)?)
     } else {
         return Err(unknown);
     };

@@ -23,6 +23,8 @@ pub enum Kind {
     Colliders = 7,
     /// The impulses of a step.
     Forces = 8,
+    /// The head of an earlier state.
+    Past = 9,
 }
 
 /// Load and step that a message belongs to.

@@ -8,7 +8,7 @@ import { decode } from "../js/net/wire.js";
 
 const golden = JSON.parse(readFileSync(new URL("../../tests/golden/messages.json", import.meta.url), "utf8"));
 const SHAPES = ["plane", "box", "sphere", "capsule", "bounds", "mesh"];
-const KINDS = ["", "scene", "frame", "frame", "tear", "pins", "stats", "colliders", "forces"];
+const KINDS = ["", "scene", "frame", "frame", "tear", "pins", "stats", "colliders", "forces", "past"];
 const RECIPIENTS = ["collider", "anchor", "particle"];
 
 /** Decodes hex into an array buffer that starts at offset 0. */
@@ -43,6 +43,7 @@ const readers = {
     encode_us: m.encodeUs, frames_per_second: m.framesPerSecond, flags: (m.isPaused ? 1 : 0) | (m.isReplay ? 2 : 0),
   }),
   colliders: (m) => ({ colliders: m.colliders }),
+  past: (m) => ({ count: m.count }),
   forces: (m) => ({
     rate_hz: m.rateHz,
     rows: m.rows.map((row) => ({ kind: RECIPIENTS.indexOf(row.kind), index: row.index, impulse: row.impulse, angular_impulse: row.angularImpulse, contacts: row.contacts })),

@@ -49,7 +49,8 @@
  *
  * @typedef {{ kind: "collider" | "anchor" | "particle", index: number, impulse: Vec3, angularImpulse: Vec3, contacts: number }} ForceRow  in N s and N m s
  * @typedef {Header & { kind: "forces", rateHz: number, rows: ForceRow[] }} Forces
- * @typedef {Scene | Frame | Tear | Pins | Stats | Colliders | Forces} Message
+ * @typedef {Header & { kind: "past", count: number }} Past
+ * @typedef {Scene | Frame | Tear | Pins | Stats | Colliders | Forces | Past} Message
  */
 
 /** Flags of a particle in PINS. */
@@ -123,6 +124,7 @@ const DECODERS = /** @type {Record<number, (reader: Reader, header: Header) => M
   6: decodeStats,
   7: decodeColliders,
   8: decodeForces,
+  9: decodePast,
 });
 
 /**
@@ -289,4 +291,11 @@ function decodeForces(reader, header) {
     if (kind !== undefined) rows.push({ kind, index, impulse, angularImpulse, contacts });
   }
   return { kind: "forces", ...header, rateHz, rows };
+}
+
+/** @param {Reader} reader @param {Header} header @returns {Past} */
+function decodePast(reader, header) {
+  const count = reader.u32();
+  reader.u32();
+  return { kind: "past", ...header, count };
 }

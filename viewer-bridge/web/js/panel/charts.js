@@ -32,6 +32,7 @@ export class Charts {
     ];
     element.replaceChildren(...this.charts.map((one) => make("div", { class: "plot" }, make("h3", {}, one.title, one.output), one.canvas)));
     simulation.on("frame", (frame) => {
+      if (simulation.isLookingBack) return;
       solve.push(frame.solveUs);
       wake.push(frame.wakeLateUs);
     });

@@ -16,15 +16,15 @@ const KEY_ZOOM = 1.2;
 export class Controls {
   /**
    * @param {import("../tools/tool.js").App} app @param {import("../tools/input.js").Input} input
-   * @param {import("./views.js").Views} views @param {import("./timeline-bar.js").TimelineBar} timeline
-   * @param {import("./banner.js").Banner} banner
+   * @param {import("./views.js").Views} views @param {{ step(count: number): void }} timeline
+   * @param {import("./undo.js").Undo} undo
    */
-  constructor(app, input, views, timeline, banner) {
+  constructor(app, input, views, timeline, undo) {
     this.app = app;
     this.input = input;
     this.views = views;
     this.timeline = timeline;
-    this.banner = banner;
+    this.undo = undo;
     this.pause = find("pause", HTMLButtonElement);
     this.step = find("step", HTMLButtonElement);
     this.reset = find("reset", HTMLButtonElement);
@@ -41,7 +41,7 @@ export class Controls {
     /** The scene that is being loaded, for quick presses of a key. @type {string | null} */
     this.requested = null;
     for (const topic of /** @type {const} */ (["scene", "connection"])) simulation.on(topic, () => { this.requested = null; });
-    for (const topic of /** @type {const} */ (["hello", "node", "playback", "scene", "parameters", "connection"])) simulation.on(topic, () => this.show());
+    for (const topic of /** @type {const} */ (["hello", "node", "playback", "scene", "parameters", "connection", "past", "undoable"])) simulation.on(topic, () => this.show());
   }
 
   listen() {
@@ -65,9 +65,10 @@ export class Controls {
     /** @type {import("./keys.js").Keymap} */
     const keymap = {
       " ": () => this.togglePause(),
-      ".": () => this.stepOnce(1),
-      ",": () => { if (app.simulation.isReplay) this.stepOnce(-1); },
+      ".": () => (app.simulation.isLookingBack ? this.timeline.step(1) : this.stepOnce(1)),
+      ",": () => this.timeline.step(-1),
       r: () => { if (!this.reset.disabled) app.commands.run("reset"); },
+      "ctrl+z": () => this.undo.run(),
       f: () => views.fit(),
       s: () => views.savePicture(),
       v: () => this.togglePanel(),
@@ -91,7 +92,7 @@ export class Controls {
       ArrowRight: () => this.arrow(1, 0),
       ArrowUp: () => this.arrow(0, -1),
       ArrowDown: () => this.arrow(0, 1),
-      Escape: () => this.input.finish(),
+      Escape: () => (app.simulation.isLookingBack ? app.simulation.returnToPresent() : this.input.finish()),
     };
     for (let digit = 1; digit <= 9; digit++) keymap[digit] = () => this.loadNumber(digit - 1);
     return keymap;
@@ -100,7 +101,7 @@ export class Controls {
   /** @param {number} x @param {number} y */
   arrow(x, y) {
     const { camera, renderer, simulation } = this.app;
-    if (simulation.isReplay && x !== 0) return this.stepOnce(x);
+    if ((simulation.isReplay || simulation.isLookingBack) && x !== 0) return this.timeline.step(x);
     if (camera.isFlat) camera.pan(-x * KEY_PIXELS, -y * KEY_PIXELS, renderer.viewport);
     else camera.orbit(-x * KEY_PIXELS, -y * KEY_PIXELS);
     renderer.isDirty = true;
@@ -174,20 +175,22 @@ export class Controls {
 
   canChange() {
     const { simulation } = this.app;
-    return simulation.isAlive && !simulation.isRecording;
+    return simulation.isAlive && !simulation.isRecording && !simulation.isLookingBack;
   }
 
   /** Updates the controls. The tooltip of a disabled control gives the reason. */
   show() {
     const { simulation } = this.app;
     const gone = simulation.isAlive ? "" : simulation.isConnected ? "No node is running." : "There is no connection to the bridge.";
-    const recorded = (/** @type {string} */ reason) => gone || (simulation.isRecording ? reason : "");
+    const past = gone || (simulation.isLookingBack ? "You are looking at an earlier state. Return to the present first (Esc)." : "");
+    const recorded = (/** @type {string} */ reason) => past || (simulation.isRecording ? reason : "");
     const isPaused = simulation.isPaused && gone === "";
     this.pause.setAttribute("aria-pressed", String(isPaused));
     setText(this.pause, isPaused ? "Resume" : "Pause");
     enable(this.pause, gone);
-    enable(this.step, gone);
+    enable(this.step, past);
     enable(this.reset, recorded("A recording cannot be reset. Use the timeline to go back."));
+    enable(this.undo.button, recorded("A recording has nothing to undo.") || this.undo.reasonAgainst());
     for (const button of this.modes) enable(button, recorded("A recording cannot be changed."));
     this.sceneName.textContent = this.name() ?? "No scene";
     this.scene.value = this.name() ?? "";

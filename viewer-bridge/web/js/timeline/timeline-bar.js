@@ -1,0 +1,134 @@
+// The timeline under the picture: marks, scrubbing and stepping. Positions are steps, as in commands. It
+// shows a recording, or the past of a live simulation.
+
+import { cssColor, enable, find, sharpContext } from "../ui/dom.js";
+import { Scale, SeekGate, clockText, marksByPixel } from "./timeline.js";
+
+/**
+ * What the timeline shows and moves. `place` is the step on show; null keeps the timeline as it is.
+ * @typedef {{
+ *   name: "live" | "replay", isThere: boolean, rateHz: number, marks: import("../net/messages.js").Mark[], place: number | null,
+ *   range(): { first: number, last: number }, clock(step: number): string,
+ *   seek(step: number, done: () => void): boolean, step(count: number): void, onChange: () => void,
+ * }} Track
+ */
+
+/** Colour and row per kind of mark. */
+const MARKS = { tear: ["--accent", 0], pin: ["--plot-a", 1], command: ["--plot-c", 1], late: ["--plot-b", 2] };
+const ROW_HEIGHT = 5;
+/** Least interval between updates of the timeline while time passes, and between drawings of marks that move. */
+const SHOW_INTERVAL_MS = 100;
+const MARKS_INTERVAL_MS = 500;
+
+export class TimelineBar {
+  /** @param {import("../state/simulation.js").Simulation} simulation @param {{ replay: Track, live: Track }} tracks */
+  constructor(simulation, tracks) {
+    this.simulation = simulation;
+    this.tracks = tracks;
+    this.element = find("timeline", HTMLElement);
+    this.slider = find("seek", HTMLInputElement);
+    this.back = find("back", HTMLButtonElement);
+    this.forward = find("forward", HTMLButtonElement);
+    this.canvas = find("marks", HTMLCanvasElement);
+    this.clock = find("clock", HTMLOutputElement);
+    // An answer reopens the gate in the next animation frame, once the step has been drawn.
+    this.gate = new SeekGate((step, done) => this.track.seek(step, () => requestAnimationFrame(() => {
+      done();
+      this.follow();
+    })));
+    this.isScrubbing = false;
+    this.shownMs = 0;
+    this.marksMs = 0;
+    this.listen();
+    this.show();
+  }
+
+  get track() {
+    return this.simulation.isReplay ? this.tracks.replay : this.tracks.live;
+  }
+
+  listen() {
+    const { simulation, slider } = this;
+    slider.addEventListener("input", () => {
+      this.isScrubbing = true;
+      this.gate.request(slider.valueAsNumber);
+      this.showStep(slider.valueAsNumber);
+    });
+    // A slider that is released where it was pressed fires no change event.
+    for (const type of ["change", "pointerup", "pointercancel", "blur"]) slider.addEventListener(type, () => { this.isScrubbing = false; });
+    this.back.addEventListener("click", () => this.step(-1));
+    this.forward.addEventListener("click", () => this.step(1));
+    new ResizeObserver(() => this.drawMarks()).observe(this.canvas);
+    for (const track of [this.tracks.replay, this.tracks.live]) track.onChange = () => this.show();
+    simulation.on("hello", () => this.show());
+    simulation.on("connection", () => this.showConnection());
+    simulation.on("frame", () => this.follow());
+    simulation.on("present", () => this.follow());
+  }
+
+  /** Disables the controls without a connection. */
+  showConnection() {
+    const reason = this.simulation.isConnected ? "" : "There is no connection to the bridge.";
+    for (const control of [this.back, this.forward, this.slider]) enable(control, reason);
+    // A disabled slider reports no release.
+    this.isScrubbing = false;
+    this.show();
+  }
+
+  /** @param {number} count */
+  step(count) {
+    if (this.track.isThere) this.track.step(count);
+  }
+
+  /** Shows the range and the marks of the track, or hides the timeline. */
+  show() {
+    const { track } = this;
+    this.element.hidden = !track.isThere;
+    this.element.dataset.track = track.name;
+    this.element.setAttribute("aria-label", track.name === "live" ? "History" : "Recording");
+    if (this.element.hidden) return;
+    this.shownMs = this.marksMs = 0;
+    this.follow();
+    if (this.marksMs === 0) this.drawMarks();
+  }
+
+  /** Moves the slider to the step on show, except while the user scrubs or a seek is in flight. */
+  follow() {
+    const { track, slider } = this;
+    if (this.element.hidden || this.isScrubbing || this.gate.isBusy || track.place === null) return;
+    const now = performance.now();
+    if (now - this.shownMs < SHOW_INTERVAL_MS && !this.simulation.isPaused) return;
+    this.shownMs = now;
+    const { first, last } = track.range();
+    const isMoved = slider.min !== String(first) || slider.max !== String(last);
+    if (isMoved) [slider.min, slider.max] = [String(first), String(last)];
+    slider.valueAsNumber = track.place;
+    this.showStep(track.place);
+    if (this.marksMs !== 0 && (!isMoved || now - this.marksMs < MARKS_INTERVAL_MS)) return;
+    this.marksMs = now;
+    this.drawMarks();
+  }
+
+  /** @param {number} step */
+  showStep(step) {
+    const { track } = this;
+    this.clock.textContent = track.clock(step);
+    this.slider.setAttribute("aria-valuetext", `step ${step}, ${clockText(step / track.rateHz)}`);
+  }
+
+  drawMarks() {
+    const { track, slider } = this;
+    if (this.element.hidden) return;
+    const { context, width } = sharpContext(this.canvas);
+    const scale = new Scale(Number(slider.min), Number(slider.max));
+    const marks = track.marks.filter(({ step }) => step >= scale.first);
+    for (const [kind, pixels] of marksByPixel(marks, scale, width)) {
+      const [color, row] = MARKS[/** @type {keyof typeof MARKS} */ (kind)] ?? ["--soft", 1];
+      context.fillStyle = cssColor(String(color));
+      for (const pixel of pixels.keys()) context.fillRect(pixel - 0.5, Number(row) * ROW_HEIGHT, 2, ROW_HEIGHT - 1);
+    }
+    const counts = new Map();
+    for (const { kind, count } of marks) counts.set(kind, (counts.get(kind) ?? 0) + count);
+    this.canvas.title = [...counts].map(([kind, count]) => `${kind}: ${count}`).join(", ");
+  }
+}
