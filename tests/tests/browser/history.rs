@@ -66,7 +66,7 @@ fn looking_back_disturbs_nobody_and_the_simulation_goes_on_from_exactly_the_stat
 fn the_timeline_is_scrubbed_and_stepped_and_returns_to_the_present() {
     let rig = Rig::new(&["curtain"], "");
     rig.tab.wait("document.querySelector('#timeline').checkVisibility() && viewer.step > 480");
-    let [from, to] = [1.0, 0.5].map(|fraction| rig.tab.pixel("#seek", fraction));
+    let [from, to] = [0.97, 0.5].map(|fraction| rig.tab.pixel("#seek", fraction));
     rig.tab.press(from, Button::Left);
     rig.tab.stroke(from, to, 6);
     rig.tab.release(to);

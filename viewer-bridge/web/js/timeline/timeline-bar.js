@@ -34,7 +34,7 @@ export class TimelineBar {
     // An answer reopens the gate in the next animation frame, once the step has been drawn.
     this.gate = new SeekGate((step, done) => this.track.seek(step, () => requestAnimationFrame(() => {
       done();
-      this.follow();
+      this.follow(true);
     })));
     this.isScrubbing = false;
     this.shownMs = 0;
@@ -62,8 +62,9 @@ export class TimelineBar {
     for (const track of [this.tracks.replay, this.tracks.live]) track.onChange = () => this.show();
     simulation.on("hello", () => this.show());
     simulation.on("connection", () => this.showConnection());
-    simulation.on("frame", () => this.follow());
-    simulation.on("present", () => this.follow());
+    // No frame may follow that of a pause or of the past.
+    simulation.on("frame", () => this.follow(simulation.isPaused || simulation.isLookingBack));
+    simulation.on("present", () => this.follow(false));
   }
 
   /** Disables the controls without a connection. */
@@ -87,17 +88,17 @@ export class TimelineBar {
     this.element.dataset.track = track.name;
     this.element.setAttribute("aria-label", track.name === "live" ? "History" : "Recording");
     if (this.element.hidden) return;
-    this.shownMs = this.marksMs = 0;
-    this.follow();
+    this.marksMs = 0;
+    this.follow(true);
     if (this.marksMs === 0) this.drawMarks();
   }
 
-  /** Moves the slider to the step on show, except while the user scrubs or a seek is in flight. */
-  follow() {
+  /** Moves the slider to the step on show, except while the user scrubs or a seek is in flight. @param {boolean} isUrgent shows it at once */
+  follow(isUrgent) {
     const { track, slider } = this;
     if (this.element.hidden || this.isScrubbing || this.gate.isBusy || track.place === null) return;
     const now = performance.now();
-    if (now - this.shownMs < SHOW_INTERVAL_MS && !this.simulation.isPaused) return;
+    if (!isUrgent && now - this.shownMs < SHOW_INTERVAL_MS) return;
     this.shownMs = now;
     const { first, last } = track.range();
     const isMoved = slider.min !== String(first) || slider.max !== String(last);
