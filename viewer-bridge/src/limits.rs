@@ -59,6 +59,17 @@ pub const STEPS_AT_ONCE_MAX: u32 = 10_000;
 pub const F32_PARTICLES_MAX: usize = 4096;
 /// Shapes of a scene that pages learn of. They only draw the others more plainly.
 pub const SHAPES_MAX: usize = 4096;
+/// Memory of the past that pages can look back at: half an hour of a small scene, some hundred states
+/// of one with 20,000 particles. Like the default of `sim-node run --history`.
+pub const HISTORY_SIZE_BYTES_MAX: usize = 64 << 20;
+/// Past states of one load: those of two minutes at full frame rate, and older ones at growing distances.
+pub const HISTORY_STATES_MAX: usize = 8192;
+/// Changes of all pages that can be undone.
+pub const UNDO_MAX: usize = 64;
+/// Memory of the complete states before them, for those that the node cannot rewind to.
+pub const UNDO_SIZE_BYTES_MAX: usize = 64 << 20;
+/// Marks on the timeline of a live simulation, which pages receive anew with each change.
+pub const HISTORY_MARKS_MAX: usize = 256;
 /// Marks on a timeline.
 pub const MARKS_MAX: usize = 4096;
 
@@ -77,6 +88,8 @@ pub const CONNECTION_TIMEOUT: Duration = Duration::from_mins(1);
 pub const EVICTION_PERIOD: Duration = Duration::from_millis(4);
 /// Time in which the node must answer a command.
 pub const OUTCOME_TIMEOUT: Duration = Duration::from_secs(2);
+/// Time in which the node must undo a change. It may have to load a scene first.
+pub const UNDO_TIMEOUT: Duration = Duration::from_secs(10);
 /// Time in which the node must release the clients' grabs when the server ends.
 pub const RELEASE_TIMEOUT: Duration = Duration::from_millis(500);
 /// Time for clients to close their connections when the server ends.

@@ -9,7 +9,8 @@ mod to_page;
 pub use check::check;
 pub use from_page::{Choice, Command, FromPage, Hello, Malformed, Wish};
 pub use refusal::Refusal;
-pub use timeline::{Hashes, Mark, MarkKind, Playback, Timeline};
+pub use timeline::{Hashes, HistoryText, Mark, MarkKind, Playback, Timeline, Toward};
 pub use to_page::{
-    Level, Mode, Node, NodeState, OutcomeText, PageLimits, ParametersText, Status, ToPage, Welcome,
+    Level, Mode, Node, NodeState, OutcomeText, PageLimits, ParametersText, Status, ToPage,
+    Undoable, Welcome,
 };

@@ -4,6 +4,7 @@ pub mod assets;
 pub(crate) mod connection;
 mod frame_encoder;
 mod frame_set;
+mod history;
 pub mod hub;
 pub mod server;
 mod session;

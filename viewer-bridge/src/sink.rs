@@ -9,7 +9,7 @@ use std::sync::Arc;
 use recorder::{OutcomeRow, StatusRow, StepRow};
 use sim_contract::{ConstraintState, Forces, LoadHeader, ParticleState, TornConstraint, Triangle};
 
-use crate::message::{Level, Node, OutcomeText, ParametersText, Playback, Timeline};
+use crate::message::{Level, Node, OutcomeText, ParametersText, Playback, Timeline, Undoable};
 use crate::request::ClientId;
 use crate::shutdown::Shutdown;
 use crate::wire::{Colliders, Pins, Scene, Stamp, Statistics};
@@ -57,6 +57,13 @@ pub enum Update<'a> {
         level: Level,
         /// The message.
         text: &'a str,
+    },
+    /// The newest change that a client can undo is another one. Only the sink of that client tells it.
+    Undoable {
+        /// The client.
+        client: ClientId,
+        /// Kind of change; `None` if there is none.
+        what: Option<Undoable>,
     },
     /// A status message of the node.
     Status(&'a StatusRow),

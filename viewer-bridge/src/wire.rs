@@ -9,6 +9,7 @@ mod decode_error;
 mod forces;
 mod frame;
 mod header;
+mod past;
 mod scene;
 mod selected;
 mod small;
@@ -22,6 +23,7 @@ pub use frame::{
     Bounds, Format, Frame, FrameHead, FrameLimits, encode as encode_frame, frame_flag,
 };
 pub use header::{KIND_VERSION, Kind, Stamp};
+pub use past::Past;
 pub use scene::{Scene, SceneText, ShapeText, scene_flag};
 pub use selected::{Inspected, InspectedParticle, Speeds};
 pub use small::{Colliders, FlaggedParticle, Pins, Tear};

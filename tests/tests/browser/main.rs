@@ -20,3 +20,9 @@ mod pointer;
 mod replay;
 mod support;
 mod time;
+
+/// Looks back, and changes that are undone.
+mod past {
+    mod history;
+    mod undo;
+}

@@ -65,20 +65,20 @@ fn scrubbing_a_recording_shows_the_recorded_positions() {
 
 #[test]
 #[ignore = "needs Chromium"]
-fn a_live_bridge_at_the_address_of_a_replay_hides_the_timeline() {
+fn a_live_bridge_at_the_address_of_a_replay_shows_its_own_timeline() {
     let sandbox = Sandbox::new();
     let file = sandbox.path("run.mcap");
     let args = ["simulate", "rope", "--steps", "24", "-o", &file];
     Process::run(Program::Recorder, &sandbox, &args).success();
     let mut replay = ReplayRig::open(sandbox, &file, "");
-    let timeline = "document.querySelector('#timeline').checkVisibility()";
-    replay.tab.wait(timeline);
+    let playback = "document.querySelector('#play').checkVisibility()";
+    replay.tab.wait(playback);
     let enabled = "[...document.querySelectorAll('#timeline :is(button, input, select)')]\
-        .filter(one => !one.disabled).length";
+        .filter(one => one.checkVisibility() && !one.disabled).length";
     assert_eq!(replay.tab.number(enabled), 6.0);
     replay.end();
     assert_eq!(replay.tab.number(enabled), 0.0);
     replay.go_live("curtain");
     replay.tab.wait("viewer.connection === 'open' && viewer.scene === 'curtain'");
-    replay.tab.wait(&format!("!{timeline} && viewer.step > 0 && viewer.mode === 'live'"));
+    replay.tab.wait(&format!("!{playback} && viewer.step > 0 && viewer.mode === 'live'"));
 }

@@ -27,7 +27,9 @@ pub fn parse(payload: &[u8], epoch: u32) -> Result<Command, String> {
         Action::Resume => Command::Resume {},
         Action::Step { count } => Command::Step { count: i32::try_from(count).unwrap_or(i32::MAX) },
         Action::Reset => Command::Reset {},
-        Action::Cut { constraint } => Command::Cut { epoch, constraints: vec![constraint] },
+        Action::Cut { constraint } => {
+            Command::Cut { epoch, constraints: vec![constraint], stroke: None }
+        }
         Action::CutRadius { center, radius } => Command::CutRadius { center, radius },
         Action::CutSegment { from, to, direction } => Command::CutSegment { from, to, direction },
         Action::MoveAnchor { anchor, translation, rotation } => {
@@ -61,7 +63,7 @@ mod tests {
     fn published_commands_are_those_of_the_file_format() {
         let read = |text: &str| parse(text.as_bytes(), 7);
         assert_eq!(read(r#"{"kind":"pin","particle":3}"#), Ok(Command::Pin { particle: 3 }));
-        let cut = Command::Cut { epoch: 7, constraints: vec![5] };
+        let cut = Command::Cut { epoch: 7, constraints: vec![5], stroke: None };
         assert_eq!(read(r#"{"kind":"cut","constraint":5}"#), Ok(cut));
         let grab = Command::Grab { particle: 1, target: [0.0, 1.0, 2.0], over_s: 0.1 };
         let text = r#"{"kind":"grab","particle":1,"target":[0,1,2],"over_s":0.1}"#;

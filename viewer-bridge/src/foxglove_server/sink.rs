@@ -74,6 +74,7 @@ impl Sink for FoxgloveSink {
             | Update::Timeline(_)
             | Update::Answer { .. }
             | Update::Reset { .. }
+            | Update::Undoable { .. }
             | Update::Notice { .. } => {}
         }
     }

@@ -70,6 +70,9 @@ pub fn check(command: &Command) -> Result<(), Reason> {
         | Command::Pause {}
         | Command::Resume {}
         | Command::Reset {}
+        | Command::Look { .. }
+        | Command::Rewind { .. }
+        | Command::Undo { .. }
         | Command::Seek { .. }
         | Command::Loop { .. } => Ok(()),
     }

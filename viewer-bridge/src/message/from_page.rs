@@ -6,6 +6,7 @@ use serde_json::{Map, Value};
 use sim_contract::{GRAB_OVER_S_DEFAULT, KindFilter, ParameterValue};
 use thiserror::Error;
 
+use super::timeline::Toward;
 use crate::limits::PARTICLES_INSPECTED_MAX;
 
 /// A message from a page.
@@ -122,6 +123,8 @@ pub enum Command {
     Cut {
         epoch: u32,
         constraints: Vec<u32>,
+        #[serde(default)]
+        stroke: Option<u32>,
     },
     CutSegment {
         from: [f32; 3],
@@ -162,6 +165,18 @@ pub enum Command {
     },
     Mark {
         text: String,
+    },
+    Look {
+        step: u64,
+        #[serde(default)]
+        toward: Toward,
+    },
+    Rewind {
+        to_step: u64,
+    },
+    Undo {
+        #[serde(default)]
+        takes_others: bool,
     },
     Seek {
         step: u64,
@@ -208,6 +223,9 @@ impl Command {
             Self::Reset {} => "reset",
             Self::Load { .. } => "load",
             Self::Mark { .. } => "mark",
+            Self::Look { .. } => "look",
+            Self::Rewind { .. } => "rewind",
+            Self::Undo { .. } => "undo",
             Self::Set { .. } => "set",
             Self::Seek { .. } => "seek",
             Self::Rate { .. } => "rate",

@@ -32,6 +32,16 @@ pub enum Refusal {
     OnlyLive,
     /// Only a recording accepts the command.
     OnlyReplay,
+    /// The page has changed nothing that can be undone.
+    NothingToUndo,
+    /// Other clients have made this many changes since.
+    ChangedByOthers(u32),
+    /// Neither the node nor the bridge has kept the state.
+    StateNotKept,
+    /// The bridge does not know how to load the scene of the state.
+    SceneNotKnown,
+    /// The scene of the state has another content now.
+    SceneChanged,
 }
 
 impl From<Reason> for Refusal {
@@ -67,6 +77,11 @@ impl Refusal {
             Self::TooManyGrabs => "too_many_grabs",
             Self::OnlyLive => "only_live",
             Self::OnlyReplay => "only_replay",
+            Self::NothingToUndo => "nothing_to_undo",
+            Self::ChangedByOthers(_) => "changed_by_others",
+            Self::StateNotKept => "state_not_kept",
+            Self::SceneNotKnown => "scene_not_known",
+            Self::SceneChanged => "scene_changed",
         }
     }
 
@@ -92,6 +107,26 @@ impl Refusal {
             }
             Self::OnlyLive => "a recording cannot be changed",
             Self::OnlyReplay => "only a recording can do this",
+            Self::NothingToUndo => {
+                "this page has not cut, reset, loaded or gone back anything that it could undo"
+            }
+            Self::ChangedByOthers(count) => {
+                let s = if count == 1 { "" } else { "s" };
+                return format!(
+                    "others have made {count} change{s} since, and this would undo them as well"
+                )
+                .into();
+            }
+            Self::StateNotKept => {
+                "the state before it is no longer kept; `sim-node run --history` keeps more"
+            }
+            Self::SceneNotKnown => {
+                "the scene before it came from a file that this viewer does not know; start the \
+                 viewer with `--scene FILE`"
+            }
+            Self::SceneChanged => {
+                "the file of the scene has changed since, so the state before it does not fit"
+            }
         };
         text.into()
     }
@@ -115,6 +150,16 @@ fn reason_text(reason: Reason, kind: &str) -> Cow<'static, str> {
         }
         (Reason::NoEffectHere, "grab" | "move" | "release" | "pin" | "unpin" | "brush") => {
             "the particle is frozen, because its state was no longer finite; reset restores it"
+        }
+        (Reason::NoEffectHere, "rewind") => {
+            "the node keeps no past states; start it without --history 0"
+        }
+        (Reason::UnknownStep, "rewind") => {
+            "the node no longer keeps a state this old, or another scene was loaded since; \
+             `sim-node run --history` keeps more"
+        }
+        (Reason::UnknownStep, "look") => {
+            "no past state is kept yet; the viewer keeps those that a page has shown"
         }
         (Reason::GrabbedByOther, _) => {
             "another client has grabbed the particle; it is free once that client releases it"

@@ -1,6 +1,7 @@
 //! Messages about a recording: its contents and its playback.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
+use sim_contract::Action;
 
 /// The contents of a recording.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -50,6 +51,41 @@ pub enum MarkKind {
     Command,
     /// Steps began late.
     Late,
+}
+
+impl MarkKind {
+    /// Number of kinds.
+    pub(crate) const COUNT: usize = 4;
+
+    /// Kind of the mark of an applied command.
+    pub(crate) fn of_action(action: &Action) -> Self {
+        match action {
+            Action::Pin { .. } | Action::Unpin { .. } => Self::Pin,
+            _ => Self::Command,
+        }
+    }
+}
+
+/// The past of a live simulation that pages can look back at.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct HistoryText {
+    /// Oldest kept step of the load, if a state is kept. The newest one is that of the newest frame.
+    pub first_step: Option<u64>,
+    /// Events, ascending by step; at most [`crate::limits::HISTORY_MARKS_MAX`].
+    pub marks: Vec<Mark>,
+    /// The reason for the user, if no state is kept.
+    pub text: String,
+}
+
+/// The side of a step on which a kept state is searched.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Toward {
+    /// The last kept state at or before the step.
+    #[default]
+    Before,
+    /// The first kept state at or after the step.
+    After,
 }
 
 /// Result of the comparison of each recorded state with its recorded hash.

@@ -5,7 +5,7 @@ use sim_contract::ParameterValues;
 
 use super::from_page::Choice;
 use super::refusal::Refusal;
-use super::timeline::{Playback, Timeline};
+use super::timeline::{HistoryText, Playback, Timeline};
 use crate::limits;
 use crate::scene::catalog::SceneEntry;
 
@@ -42,6 +42,13 @@ pub enum ToPage {
     Timeline(Box<Timeline>),
     /// The playback of a recording.
     Playback(Playback),
+    /// The past of a live simulation.
+    History(HistoryText),
+    /// The newest change of the page that it can undo.
+    Undoable {
+        /// Kind of change.
+        what: Option<Undoable>,
+    },
 }
 
 impl ToPage {
@@ -202,6 +209,8 @@ pub struct OutcomeText {
     pub reason: Option<Refusal>,
     /// A sentence for the user, or "".
     pub text: String,
+    /// Step whose state is shown or put in place, for `look` and `rewind`.
+    pub state_step: Option<u64>,
 }
 
 #[allow(
@@ -228,6 +237,7 @@ impl OutcomeText {
             rejected: 0,
             reason: None,
             text: String::new(),
+            state_step: None,
         }
     }
 
@@ -249,6 +259,32 @@ impl OutcomeText {
         if self.reason.is_none() {
             self.reason = Some(reason);
             self.text = reason.text(self.kind).into_owned();
+        }
+    }
+}
+
+/// A change that a page can undo.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Undoable {
+    /// A cut: one stroke.
+    Cut,
+    /// A reset.
+    Reset,
+    /// A load of a scene.
+    Load,
+    /// Going on from an earlier state.
+    Rewind,
+}
+
+impl Undoable {
+    /// Name for the user.
+    pub(crate) fn text(self) -> &'static str {
+        match self {
+            Self::Cut => "the cut",
+            Self::Reset => "the reset",
+            Self::Load => "the load of another scene",
+            Self::Rewind => "the jump to an earlier state",
         }
     }
 }

@@ -40,6 +40,16 @@ pub(crate) struct Wishes {
     pub(crate) particles: Vec<u32>,
 }
 
+impl Wishes {
+    /// Returns the messages of a frame that fulfil them.
+    pub(super) fn select(&self, frame: &FrameSet) -> impl Iterator<Item = Bytes> + use<> {
+        let forces = frame.forces.clone().filter(|_| self.forces);
+        let speeds = frame.speeds.clone().filter(|_| self.speeds);
+        let inspected = frame.inspected.clone().filter(|_| !self.particles.is_empty());
+        [forces, speeds, inspected].into_iter().flatten()
+    }
+}
+
 /// A page that has joined.
 #[derive(Debug)]
 pub(crate) struct Connection {
@@ -115,11 +125,7 @@ impl Connection {
 
     /// Returns the messages of a frame that the page has asked for.
     fn wished(&self, frame: &FrameSet) -> impl Iterator<Item = Bytes> + use<> {
-        let wishes = self.wishes.lock().unwrap_or_else(PoisonError::into_inner);
-        let forces = frame.forces.clone().filter(|_| wishes.forces);
-        let speeds = frame.speeds.clone().filter(|_| wishes.speeds);
-        let inspected = frame.inspected.clone().filter(|_| !wishes.particles.is_empty());
-        [forces, speeds, inspected].into_iter().flatten()
+        self.wishes.lock().unwrap_or_else(PoisonError::into_inner).select(frame)
     }
 
     /// Changes the wishes of the page.

@@ -27,6 +27,16 @@ pub(crate) struct FrameSet {
     pub(crate) inspected: Option<Bytes>,
 }
 
+impl FrameSet {
+    /// Size of all messages.
+    pub(super) fn size_bytes(&self) -> usize {
+        let colliders = self.colliders.as_ref().map(|colliders| &colliders.bytes);
+        let Self { f32, u16, forces, speeds, inspected, .. } = self;
+        let messages = [f32, u16, forces, speeds, inspected].map(Option::as_ref);
+        messages.into_iter().chain([colliders]).flatten().map(Bytes::len).sum()
+    }
+}
+
 /// The colliders of a state.
 #[derive(Debug, Clone)]
 pub(crate) struct ColliderSet {

@@ -10,19 +10,21 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use axum::extract::ws::Message;
 use bytes::Bytes;
+use sim_contract::Reason;
 use tokio::sync::{mpsc, watch};
 
 use super::connection::{Connection, Credit, SentFrames, Wishes};
 use super::frame_encoder::{FrameEncoder, Wanted};
 pub use super::frame_set::Formats;
 use super::frame_set::{FrameSet, format_for};
+use super::history::{History, PastMessages, Viewer};
 use crate::limits::{PROTOCOL, RELIABLE_QUEUED_MAX};
-use crate::message::{Choice, Level, Mode, PageLimits, ToPage, Welcome};
+use crate::message::{Choice, Level, Mode, PageLimits, Refusal, ToPage, Toward, Welcome};
 use crate::request::{ClientId, RequestKind, RequestSender};
 use crate::scene::catalog::SceneEntry;
-use crate::sink::{Demand, Sink, Torn, Update};
+use crate::sink::{Demand, Sink, State, Torn, Update};
 use crate::wire::convert::count_u32;
-use crate::wire::{Statistics, Tear};
+use crate::wire::{Stamp, Statistics, Tear};
 
 /// Latched messages, in the order in which a new page receives them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -35,6 +37,7 @@ enum Slot {
     Scene,
     Tear,
     Pins,
+    History,
     /// The notice about a newer load that cannot be shown.
     LoadRefused,
 }
@@ -46,6 +49,8 @@ pub struct Hub {
     scenes: Vec<SceneEntry>,
     state: Mutex<HubState>,
     encoder: Mutex<FrameEncoder>,
+    /// The past of a live simulation.
+    history: Mutex<History>,
     frames: watch::Sender<Arc<FrameSet>>,
     requests: RequestSender,
 }
@@ -106,6 +111,7 @@ impl Hub {
             scenes,
             state: Mutex::default(),
             encoder: Mutex::default(),
+            history: Mutex::default(),
             frames: watch::Sender::default(),
             requests,
         }
@@ -156,9 +162,50 @@ impl Hub {
             let tear = Tear { stamp: *stamp, first: count_u32(first), torn: all[first..].to_vec() };
             Message::Binary(tear.encode())
         };
+        let all_of_them = tear(0);
+        if let Message::Binary(bytes) = &all_of_them {
+            let (known_count, count) = (count_u32(*known_count), count_u32(all.len()));
+            lock(&self.history).set_torn(stamp.step, known_count, count, bytes.clone());
+        }
         let mut state = lock(&self.state);
         state.queue(&tear(*known_count));
-        state.latched.insert(Slot::Tear, tear(0));
+        state.latched.insert(Slot::Tear, all_of_them);
+    }
+
+    /// Encodes a state in the formats that pages wait for, and keeps it for those that look back.
+    fn publish_state(&self, state: &State<'_>) {
+        let formats = self.awaited_formats(state.particles.len());
+        if !formats.is_any() {
+            return;
+        }
+        let frame = Arc::new(lock(&self.encoder).encode(state, formats, &self.wanted()));
+        if self.mode == Mode::Live {
+            let stamp = Stamp { epoch: state.epoch, step: state.row.step };
+            lock(&self.history).keep(stamp, &frame);
+        }
+        self.frames.send_replace(frame);
+    }
+
+    fn publish_history(&self) {
+        let change = lock(&self.history).take_change();
+        if let Some(text) = change.filter(|_| self.mode == Mode::Live) {
+            self.latch(Slot::History, &ToPage::History(text));
+        }
+    }
+
+    /// Finds the past state nearest to a step for a page.
+    pub(super) fn look(
+        &self,
+        page: &Connection,
+        step: u64,
+        toward: Toward,
+    ) -> Result<PastMessages, Refusal> {
+        if self.mode != Mode::Live {
+            return Err(Refusal::OnlyLive);
+        }
+        let wishes = lock(&page.wishes);
+        let viewer = Viewer { choice: page.choice, wishes: &wishes };
+        lock(&self.history).find(step, toward, viewer).ok_or(Reason::UnknownStep.into())
     }
 
     fn publish_statistics(&self, statistics: &Statistics) {
@@ -261,6 +308,7 @@ impl Sink for Hub {
         match *update {
             Update::Load(scene) => {
                 lock(&self.encoder).begin_load(scene);
+                lock(&self.history).begin_load(scene.rate_hz);
                 self.latch_binary(Slot::Scene, scene.encode());
             }
             Update::LoadRefused { text } => {
@@ -268,18 +316,18 @@ impl Sink for Hub {
                 self.latch(Slot::LoadRefused, &ToPage::Notice { level: Level::Error, text });
             }
             Update::Torn(torn) => self.publish_torn(&torn),
-            Update::Pins(pins) => self.latch_binary(Slot::Pins, pins.encode()),
-            Update::Colliders(colliders) => lock(&self.encoder).set_colliders(colliders),
-            Update::State(state) => {
-                let formats = self.awaited_formats(state.particles.len());
-                if formats.is_any() {
-                    let wanted = self.wanted();
-                    let frame = lock(&self.encoder).encode(&state, formats, &wanted);
-                    self.frames.send_replace(Arc::new(frame));
-                }
+            Update::Pins(pins) => {
+                let bytes = pins.encode();
+                lock(&self.history).set_pins(bytes.clone());
+                self.latch_binary(Slot::Pins, bytes);
             }
+            Update::Colliders(colliders) => lock(&self.encoder).set_colliders(colliders),
+            Update::State(state) => self.publish_state(&state),
             Update::SameState => self.frames.send_modify(|_| {}),
-            Update::Statistics(statistics) => self.publish_statistics(statistics),
+            Update::Statistics(statistics) => {
+                self.publish_history();
+                self.publish_statistics(statistics);
+            }
             Update::Node(node) => self.latch(Slot::Node, &ToPage::Node(node.clone())),
             Update::Parameters(parameters) => {
                 self.latch(Slot::Parameters, &ToPage::Parameters(Box::new(parameters.clone())));
@@ -295,8 +343,10 @@ impl Sink for Hub {
             Update::Answer { client, outcome } => {
                 self.send(client, &ToPage::Outcome(outcome.clone()));
             }
+            Update::Undoable { client, what } => self.send(client, &ToPage::Undoable { what }),
+            Update::Outcome(row) => lock(&self.history).add_outcome(row),
             // Pages receive the answers to their own commands, and statistics, and the topology in SCENE.
-            Update::Topology(_) | Update::Status(_) | Update::Outcome(_) => {}
+            Update::Topology(_) | Update::Status(_) => {}
         }
     }
 }

@@ -3,10 +3,12 @@
 use std::sync::Arc;
 
 use axum::extract::ws::{Message, WebSocket};
+use bytes::Bytes;
 use tokio::sync::{Semaphore, SemaphorePermit};
 use tokio::time::timeout;
 
 use super::connection::{Acknowledged, Connection, NextFrame};
+use super::history::PastMessages;
 use super::hub::Hub;
 use crate::limits::{HELLO_TIMEOUT, PROTOCOL};
 use crate::message::{Command, FromPage, Hello, OutcomeText, Refusal, ToPage, Wish, check};
@@ -122,9 +124,10 @@ async fn converse(peer: &mut Peer, sessions: &Sessions, mut connection: Connecti
                 Some(message) => peer.send(message).await,
                 None => Err(End::closed(TOO_SLOW, "too many messages were left unread")),
             },
-            message = peer.receive() => {
-                message.and_then(|message| accept(&message, hub, &mut connection))
-            }
+            message = peer.receive() => match message {
+                Ok(message) => accept(&message, peer, hub, &mut connection).await,
+                Err(end) => Err(end),
+            },
             changed = connection.frames.changed(), if has_credit => match changed {
                 Ok(()) => send_frame(peer, hub, &mut connection).await,
                 Err(_) => Err(End::closed(GOING_AWAY, "the server shuts down")),
@@ -147,17 +150,53 @@ async fn send_frame(peer: &mut Peer, hub: &Hub, connection: &mut Connection) -> 
             return Ok(());
         }
     };
+    send_queue(peer, connection).await?;
+    send_all(peer, frame).await
+}
+
+/// Sends the reliable messages.
+async fn send_queue(peer: &mut Peer, connection: &mut Connection) -> Result<(), End> {
     while let Ok(message) = connection.queue.try_recv() {
         peer.send(message).await?;
     }
-    for bytes in frame {
+    Ok(())
+}
+
+async fn send_all(peer: &mut Peer, messages: Vec<Bytes>) -> Result<(), End> {
+    for bytes in messages {
         peer.send(Message::Binary(bytes)).await?;
     }
     Ok(())
 }
 
+/// Sends a past state, after the reliable messages that it depends on, and the answer. Nothing waits in
+/// a queue: the page's next message is read when all of it is on its way.
+async fn show_past(
+    peer: &mut Peer,
+    connection: &mut Connection,
+    id: Option<u32>,
+    sought: Result<PastMessages, Refusal>,
+) -> Result<(), End> {
+    let kind = "look";
+    let answer = match sought {
+        Err(reason) => OutcomeText::refused(id, kind, reason),
+        Ok(past) => {
+            send_queue(peer, connection).await?;
+            let state_step = Some(past.step);
+            send_all(peer, past.messages).await?;
+            OutcomeText { applied: 1, state_step, ..OutcomeText::pending(id, kind) }
+        }
+    };
+    peer.send(Message::Text(ToPage::Outcome(answer).to_json().into())).await
+}
+
 /// Handles a message of a page that has joined.
-fn accept(message: &Message, hub: &Hub, connection: &mut Connection) -> Result<(), End> {
+async fn accept(
+    message: &Message,
+    peer: &mut Peer,
+    hub: &Hub,
+    connection: &mut Connection,
+) -> Result<(), End> {
     match parse(message)? {
         FromPage::Ack { frame } => {
             if connection.acknowledge(frame) == Acknowledged::CreditRestored {
@@ -172,6 +211,10 @@ fn accept(message: &Message, hub: &Hub, connection: &mut Connection) -> Result<(
             });
             // The page has not received this part of the state on show.
             hub.request(connection.client, RequestKind::State);
+        }
+        FromPage::Command { id, command: Command::Look { step, toward } } => {
+            let sought = hub.look(connection, step, toward);
+            return show_past(peer, connection, id, sought).await;
         }
         FromPage::Command { id, command } => submit(hub, connection.client, id, command),
         FromPage::Hello(_) => return Err(End::closed(MALFORMED, "hello was sent twice")),

@@ -10,6 +10,7 @@ mod node_text;
 mod statistics;
 #[cfg(test)]
 mod tests;
+mod undo;
 mod updates;
 
 use std::sync::Arc;
@@ -26,6 +27,7 @@ use crate::scene::catalog::{Catalog, SceneEntry};
 use crate::sink::{Sinks, Update};
 use crate::source::shown_state::ShownState;
 use link::{Link, LinkEnd};
+use undo::Undo;
 
 /// Time between two searches for a node.
 const SEARCH_PERIOD: Duration = Duration::from_millis(300);
@@ -40,13 +42,21 @@ pub struct Live {
     shown: ShownState,
     /// The state of the node that was published last.
     node: Node,
+    /// Changes that pages can undo, kept between two links.
+    undo: Undo,
 }
 
 impl Live {
     /// Shows the node at this endpoint, which pages can let load the scenes of the catalog.
     pub fn new(endpoint: Endpoint, catalog: Catalog) -> Self {
         let catalog = Arc::new(catalog);
-        Self { endpoint, catalog, shown: ShownState::default(), node: Node::default() }
+        Self {
+            endpoint,
+            catalog,
+            shown: ShownState::default(),
+            node: Node::default(),
+            undo: Undo::default(),
+        }
     }
 
     /// Waits for a node. Returns `None` if the program ends first.
@@ -105,8 +115,9 @@ impl Source for Live {
         sinks.publish(&Update::Node(&self.node));
         sinks.publish(&Update::Parameters(&ParametersText::UNKNOWN));
         while let Some(mut link) = self.search(sinks, requests) {
+            link.undo = std::mem::take(&mut self.undo);
             let end = self.show(&mut link, sinks, requests);
-            link.close(sinks, end);
+            self.undo = link.close(sinks, end);
             match end {
                 LinkEnd::ShuttingDown => break,
                 // The search finds the new run at once.

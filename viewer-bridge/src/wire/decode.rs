@@ -5,6 +5,7 @@ use super::decode_error::DecodeError;
 use super::forces::Forces;
 use super::frame::{self, Format, Frame};
 use super::header::{KIND_VERSION, Kind, Stamp};
+use super::past::Past;
 use super::scene::Scene;
 use super::selected::{Inspected, Speeds};
 use super::small::{Colliders, Pins, Tear};
@@ -31,6 +32,8 @@ pub enum Message {
     Speeds(Speeds),
     /// The exact states of some particles.
     Inspected(Inspected),
+    /// The head of an earlier state.
+    Past(Past),
 }
 
 /// Decodes one message.
@@ -66,6 +69,8 @@ pub fn decode(bytes: &[u8]) -> Result<Message, DecodeError> {
         Message::Speeds(Speeds::decode(stamp, &mut cursor)?)
     } else if is(Kind::Inspected) {
         Message::Inspected(Inspected::decode(stamp, &mut cursor)?)
+    } else if is(Kind::Past) {
+        Message::Past(Past::decode(stamp, &mut cursor)?)
     } else {
         return Err(unknown);
     };

@@ -27,6 +27,8 @@ pub enum Kind {
     Speeds = 9,
     /// The exact states of some particles.
     Inspected = 10,
+    /// The head of an earlier state.
+    Past = 11,
 }
 
 /// Load and step that a message belongs to.

@@ -101,6 +101,7 @@ impl FoxgloveSite {
             kind,
             status: Status::Applied,
             step: Some(8),
+            state_step: None,
             applied: 1,
             rejected: 0,
             reason: None,

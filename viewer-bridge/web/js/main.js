@@ -20,6 +20,9 @@ import { Connector } from "./net/socket.js";
 import { Selection } from "./state/selection.js";
 import { Simulation } from "./state/simulation.js";
 import { TimelineBar } from "./timeline/timeline-bar.js";
+import { LiveTrack } from "./timeline/live-track.js";
+import { ReplayTrack } from "./timeline/replay-track.js";
+import { Undo } from "./ui/undo.js";
 import { createViewer } from "./viewer.js";
 import { Views } from "./ui/views.js";
 import { Wishes } from "./state/wishes.js";
@@ -27,7 +30,7 @@ import { Wishes } from "./state/wishes.js";
 /** Key of the token in sessionStorage, so that it survives a reload. */
 const TOKEN_KEY = "catenary-token";
 /** Reasons of refusals that are not worth a notice. */
-const QUIET_REASONS = new Set(["already_torn", "not_grabbed", "stale_epoch"]);
+const QUIET_REASONS = new Set(["already_torn", "not_grabbed", "stale_epoch", "changed_by_others"]);
 
 /** Uncaught errors, for tests. @type {string[]} */
 const faults = [];
@@ -92,8 +95,9 @@ function start(renderer) {
   const input = new Input(renderer.canvas, app, () => controls.canChange());
   const overlay = new Overlay(find("overlay", HTMLCanvasElement), app, input);
   const views = new Views(app, banner);
-  const timeline = new TimelineBar(simulation, commands);
-  const controls = new Controls(app, input, views, timeline, banner);
+  const timeline = new TimelineBar(simulation, { replay: new ReplayTrack(simulation, commands), live: new LiveTrack(simulation, commands, banner) });
+  const undo = new Undo(app, banner);
+  const controls = new Controls(app, input, views, timeline, undo);
   const panel = new Panel(find("parameters", HTMLFormElement), find("parameters-note", HTMLElement), app, banner);
   const inspector = new Inspector(app, input, banner);
   controls.onInspect = () => inspector.turn();

@@ -23,6 +23,12 @@ export function createViewer({ app, colorLegend, charts, connector, banner, inpu
     get scene() { return simulation.scene?.name ?? null; },
     get connection() { return connector.connection.state; },
     get node() { return simulation.node?.state ?? null; },
+    /** Step of the earlier state on show, or null in the present. */
+    get past() { return simulation.isLookingBack ? simulation.frame?.step ?? null : null; },
+    /** Newest step received, on show or not. */
+    get present() { return simulation.present?.step ?? -1; },
+    get scenes() { return simulation.hello?.scenes ?? []; },
+    get history() { return simulation.history; },
     get mode() { return simulation.hello?.mode ?? null; },
     get paused() { return simulation.isPaused; },
     get particleCount() { return simulation.scene?.particleCount ?? 0; },

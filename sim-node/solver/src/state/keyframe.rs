@@ -95,6 +95,11 @@ impl Keyframe {
         &self.torn
     }
 
+    /// Returns `true` if a client grabs a particle.
+    pub fn has_grabs(&self) -> bool {
+        !self.grabs.is_empty()
+    }
+
     /// Returns the parameters of a scene that uses `method`, with a time scale of 1: the pace belongs to
     /// the node and is not part of the state.
     pub fn parameter_values(&self, method: Method) -> ParameterValues {

@@ -296,6 +296,18 @@ impl Tab {
         }
     }
 
+    /// Presses and releases a key together with Ctrl.
+    pub(crate) fn ctrl_key(&self, key: char) {
+        let key = key.to_string();
+        for kind in ["rawKeyDown", "keyUp"] {
+            // Bit 1 of the modifiers is Ctrl.
+            self.call(
+                "Input.dispatchKeyEvent",
+                json!({ "type": kind, "key": key, "modifiers": 2 }),
+            );
+        }
+    }
+
     /// Clicks a text field, replaces its text, and confirms it.
     pub(crate) fn type_into(&self, selector: &str, text: &str) {
         self.evaluate(&format!("document.querySelector({selector:?}).scrollIntoView()"));

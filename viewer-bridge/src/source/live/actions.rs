@@ -51,6 +51,7 @@ pub(super) fn actions(
             Action::Step { count: u32::try_from(count).map_err(|_| Refusal::OnlyReplay)? }
         }
         Command::Reset {} => Action::Reset,
+        Command::Rewind { to_step } => Action::Rewind { to_step: Some(to_step), back_steps: None },
         // A path would let anybody with the page read the files of the node's user.
         Command::Load { scene } => {
             Action::Load { scene: catalog.source(&scene).ok_or(Refusal::UnknownScene)? }
@@ -68,6 +69,8 @@ pub(super) fn actions(
             constraint_kind: None,
         },
         Command::Seek { .. } | Command::Loop { .. } => return Err(Refusal::OnlyReplay),
+        // The hub answers the one, and the link the other.
+        Command::Look { .. } | Command::Undo { .. } => return Err(Refusal::OnlyLive),
     };
     Ok(vec![action])
 }
@@ -79,6 +82,7 @@ fn changes_simulation(command: &Command) -> bool {
         | Command::Resume {}
         | Command::Step { .. }
         | Command::Rate { .. }
+        | Command::Rewind { .. }
         | Command::Seek { .. }
         | Command::Loop { .. } => false,
         Command::Set { parameter, .. } => *parameter != Parameter::TimeScale.name(),

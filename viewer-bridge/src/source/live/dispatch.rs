@@ -40,6 +40,15 @@ struct GrabOwner {
     is_applied: bool,
 }
 
+/// The origin of an action.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Origin {
+    /// `None` if the client has left, or has been told that its command was not answered.
+    pub(super) client: Option<ClientId>,
+    /// Number of the command.
+    pub(super) command: u64,
+}
+
 /// An action of a command.
 #[derive(Debug, Clone, Copy)]
 struct Part {
@@ -63,6 +72,8 @@ struct OpenCommand {
 struct PartOutcome {
     /// First step that shows it.
     step: Option<u64>,
+    /// Step whose state a rewind has put in place.
+    state_step: Option<u64>,
     result: Result<(), Refusal>,
 }
 
@@ -167,11 +178,24 @@ impl Dispatch {
                 }
                 Err(_) => {
                     self.forget_unsent_grab(part.action);
-                    let outcome = PartOutcome { step: None, result: Err(Refusal::NoNode) };
+                    let result = Err(Refusal::NoNode);
+                    let outcome = PartOutcome { step: None, state_step: None, result };
                     self.close_part(sinks, part.command, outcome);
                 }
             }
         }
+    }
+
+    /// Number of the newest command.
+    pub(super) fn last_command(&self) -> u64 {
+        self.last_command
+    }
+
+    /// Returns the client and the number of the command to which an action belongs.
+    pub(super) fn origin(&self, sequence: u64) -> Option<Origin> {
+        let command = self.sent.get(&sequence)?.command?;
+        let client = self.open.get(&command).map(|open| open.client);
+        Some(Origin { client, command })
     }
 
     /// Handles the outcome of an action that this bridge sent.
@@ -197,7 +221,12 @@ impl Dispatch {
             }
             _ => {}
         }
-        self.close_part(sinks, command, PartOutcome { step: Some(outcome.step), result });
+        let state_step = match outcome.command.action() {
+            Action::Rewind { to_step, .. } if result.is_ok() => to_step,
+            _ => None,
+        };
+        let outcome = PartOutcome { step: Some(outcome.step), state_step, result };
+        self.close_part(sinks, command, outcome);
     }
 
     /// Removes an answered action and returns the number of its command. The node answers in the order
@@ -252,6 +281,7 @@ impl Dispatch {
         let Some(command) = self.open.get_mut(&number) else { return };
         let outcome = &mut command.outcome;
         outcome.step = outcome.step.max(part.step);
+        outcome.state_step = part.state_step.or(outcome.state_step);
         match part.result {
             Ok(()) => outcome.applied += 1,
             Err(reason) => outcome.reject_part(reason),

@@ -14,10 +14,13 @@ use super::dispatch::Dispatch;
 use super::newest_state::{LoadedState, NewestState};
 use super::node_text::node_text;
 use super::statistics::statistics;
+use super::undo::kept_state::Keyframes;
+use super::undo::stack::Change;
+use super::undo::{Undo, UndoRequest};
 use super::updates::Updates;
 use crate::limits::{FRAMES_PER_SECOND_MAX, RELEASE_TIMEOUT};
-use crate::message::{Level, Node, ParametersText};
-use crate::request::{Request, RequestKind, Requests};
+use crate::message::{Command, Level, Node, ParametersText};
+use crate::request::{ClientId, Request, RequestKind, Requests};
 use crate::scene::catalog::Catalog;
 use crate::sink::{Demand, Sinks, State, Update};
 use crate::source::shown_state::ShownState;
@@ -69,6 +72,10 @@ pub(super) struct Link {
     /// The parameters that were published last.
     published_parameters: Option<ParametersText>,
     pub(super) dispatch: Dispatch,
+    catalog: Arc<Catalog>,
+    /// It outlives the link: a load can begin another run.
+    pub(super) undo: Undo,
+    keyframes: Keyframes,
     shown_id: Option<ShownId>,
     pub(super) next_frame_ns: u64,
     next_owner_check_ns: u64,
@@ -87,6 +94,9 @@ impl Link {
             reads_forces: false,
             published_parameters: None,
             dispatch: Dispatch::new(Arc::clone(catalog)),
+            catalog: Arc::clone(catalog),
+            undo: Undo::default(),
+            keyframes: Keyframes::default(),
             shown_id: None,
             next_frame_ns: 0,
             next_owner_check_ns: 0,
@@ -188,20 +198,48 @@ impl Link {
         match request.kind {
             RequestKind::State => self.shown_id = None,
             RequestKind::Credit => {}
-            RequestKind::Left => self.dispatch.remove_client(client),
-            RequestKind::Command { id, command } => {
-                let state = self.newest.get();
-                let context = CommandContext {
-                    epoch: shown.epoch(),
-                    rate_hz: state.map_or(1, |state| state.load.header.rate_hz.max(1)),
-                    is_planar: state.is_some_and(|state| state.load.summary.is_planar),
-                    is_replay: self.status.as_ref().is_some_and(NodeStatus::is_replay),
-                    particles: state.map_or(&[], |state| state.particles),
-                };
-                if let Some(outcome) = self.dispatch.submit(client, id, command, context) {
+            RequestKind::Left => {
+                self.dispatch.remove_client(client);
+                self.undo.remove_client(client);
+            }
+            RequestKind::Command { id, command: Command::Undo { takes_others } } => {
+                let request = UndoRequest { client, id, takes_others };
+                let answer = self.undo.begin(request, self.newest.get(), &mut self.client);
+                if let Some(outcome) = answer {
                     sinks.publish(&Update::Answer { client, outcome: &outcome });
                 }
             }
+            RequestKind::Command { id, command } => {
+                self.submit((client, id), command, shown, sinks);
+            }
+        }
+    }
+
+    /// Gives a command to the dispatch. Keeps the state before a change that can be undone.
+    fn submit(
+        &mut self,
+        (client, id): (ClientId, Option<u32>),
+        command: Command,
+        shown: &ShownState,
+        sinks: &Sinks,
+    ) {
+        let state = self.newest.get();
+        let context = CommandContext {
+            epoch: shown.epoch(),
+            rate_hz: state.map_or(1, |state| state.load.header.rate_hz.max(1)),
+            is_planar: state.is_some_and(|state| state.load.summary.is_planar),
+            is_replay: self.status.as_ref().is_some_and(NodeStatus::is_replay),
+            particles: state.map_or(&[], |state| state.particles),
+        };
+        let known = (&self.keyframes, &*self.catalog);
+        let awaited = state.and_then(|state| self.undo.prepare(client, &command, &state, known));
+        let before = self.dispatch.last_command();
+        if let Some(outcome) = self.dispatch.submit(client, id, command, context) {
+            sinks.publish(&Update::Answer { client, outcome: &outcome });
+        }
+        let number = self.dispatch.last_command();
+        if let Some(awaited) = awaited.filter(|_| number != before) {
+            self.undo.await_outcome(number, awaited);
         }
     }
 
@@ -213,7 +251,13 @@ impl Link {
         let run = check_run(&mut self.run_id, run_id);
         // A client that waits for an answer sees the effect of its command after the answer. The last
         // answers of a run arrive together with the first messages of the next one.
-        handle_outcomes(&mut self.dispatch, &mut self.client, &updates.outcomes, sinks);
+        handle_outcomes(
+            (&mut self.dispatch, &mut self.undo),
+            &mut self.client,
+            self.newest.get(),
+            &updates.outcomes,
+            sinks,
+        );
         if let (Some(state), Ok(())) = (state, run) {
             self.newest.update(&state, shown, sinks);
         }
@@ -222,6 +266,8 @@ impl Link {
             self.status = Some(*status);
         }
         run?;
+        updates.keyframes.into_iter().for_each(|(step, bytes)| self.keyframes.add(step, bytes));
+        self.undo.follow(self.newest.get(), &mut self.client, sinks);
         self.parameters = updates.parameters.or(self.parameters);
         self.publish_parameters(sinks);
         Ok(())
@@ -283,12 +329,15 @@ impl Link {
     }
 
     /// Answers the open commands. If the node goes on without this bridge, ends the clients' grabs.
-    pub(super) fn close(mut self, sinks: &Sinks, end: LinkEnd) {
+    /// Returns what pages can undo.
+    pub(super) fn close(mut self, sinks: &Sinks, end: LinkEnd) -> Undo {
         self.dispatch.expire(sinks, u64::MAX);
         if end == LinkEnd::ShuttingDown {
             self.release_grabs(sinks);
         }
         sinks.publish(&Update::Parameters(&ParametersText::UNKNOWN));
+        self.undo.end_run(end == LinkEnd::NewRun, sinks);
+        self.undo
     }
 
     /// Releases all grabs, because the tasks of the clients end with the server. Waits for the node no
@@ -301,7 +350,13 @@ impl Link {
             self.dispatch.flush(&mut self.client, sinks);
             let mut updates = Updates::for_run(self.run_id);
             self.tap.latest_state(|update| updates.add(update));
-            handle_outcomes(&mut self.dispatch, &mut self.client, &updates.outcomes, sinks);
+            handle_outcomes(
+                (&mut self.dispatch, &mut self.undo),
+                &mut self.client,
+                None,
+                &updates.outcomes,
+                sinks,
+            );
             let left_ns = end_ns.saturating_sub(monotonic_ns());
             if !self.dispatch.is_releasing() || left_ns == 0 {
                 return;
@@ -330,10 +385,23 @@ fn end_grabs(dispatch: &mut Dispatch, action: &Action) {
     }
 }
 
+/// Notes what a client of the bridge, or another program, has changed.
+fn note_change(dispatch: &Dispatch, undo: &mut Undo, outcome: &Outcome, is_own: bool) {
+    let origin = dispatch.origin(outcome.command.sequence).filter(|_| is_own);
+    // The bridge ends the grabs of clients that have left.
+    if is_own && origin.is_none() {
+        return;
+    }
+    let client = origin.and_then(|origin| origin.client);
+    let command = origin.map(|origin| origin.command);
+    undo.add(Change { step: outcome.step, client, command }, &outcome.command.action());
+}
+
 /// Publishes outcomes, and answers the clients whose commands they belong to.
 fn handle_outcomes(
-    dispatch: &mut Dispatch,
+    (dispatch, undo): (&mut Dispatch, &mut Undo),
     client: &mut Client,
+    newest: Option<LoadedState<'_>>,
     outcomes: &[Outcome],
     sinks: &Sinks,
 ) {
@@ -351,7 +419,14 @@ fn handle_outcomes(
         {
             dispatch.end_applied_grab(particle);
         }
-        if outcome.command.client_id == client.client_id() {
+        let is_own = outcome.command.client_id == client.client_id();
+        if is_own && undo.on_outcome(outcome, newest, client, sinks) {
+            continue;
+        }
+        if outcome.is_applied() {
+            note_change(dispatch, undo, outcome, is_own);
+        }
+        if is_own {
             dispatch.on_outcome(sinks, outcome);
         }
     }

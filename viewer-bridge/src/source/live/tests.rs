@@ -1,5 +1,7 @@
 //! A link and an owner in one process. The owner publishes in the order of each test.
 
+mod undo;
+
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -55,7 +57,7 @@ fn load(step: u64, topology_revision: u32) -> OwnerLoad<'static> {
         constraints: &[STRUT],
         triangles: &[],
         collider_count: 1,
-        keyframe_size_bytes_max: 8,
+        keyframe_size_bytes_max: 4096,
         parameters: ParameterValues::default(),
     }
 }

@@ -13,6 +13,8 @@ pub(super) struct Updates {
     pub(super) parameters: Option<ParameterValues>,
     /// The newest status of the known run.
     pub(super) status: Option<NodeStatus>,
+    /// Steps and bytes of the keyframes of the known run.
+    pub(super) keyframes: Vec<(u64, Vec<u8>)>,
     /// Run of the newest load or status.
     pub(super) run_id: Option<u64>,
 }
@@ -33,13 +35,17 @@ impl Updates {
                     self.status = Some(*status);
                 }
             }
+            Update::Keyframe(header, bytes) => {
+                if self.known_run.is_none_or(|known| known == header.run_id) {
+                    self.keyframes.push((header.step, bytes.to_vec()));
+                }
+            }
             // The tap returns these with their state.
             Update::Scene(..)
             | Update::Surface(..)
             | Update::Colliders(..)
             | Update::Tears(..)
-            | Update::Forces(..)
-            | Update::Keyframe(..) => {}
+            | Update::Forces(..) => {}
         }
     }
 }

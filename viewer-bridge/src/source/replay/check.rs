@@ -9,7 +9,7 @@ use recorder::{
     state_hash,
 };
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
-use sim_contract::{Action, ParticleState, Torn};
+use sim_contract::{ParticleState, Torn};
 
 use super::marks::Marks;
 use crate::message::{Hashes, Mark, MarkKind};
@@ -119,11 +119,7 @@ impl Check {
 
     fn add_outcome(&mut self, row: &OutcomeRow) {
         if row.is_applied() {
-            let kind = match row.action {
-                Action::Pin { .. } | Action::Unpin { .. } => MarkKind::Pin,
-                _ => MarkKind::Command,
-            };
-            self.marks.add(kind, row.step, 1);
+            self.marks.add(MarkKind::of_action(&row.action), row.step, 1);
         }
     }
 

@@ -6,10 +6,10 @@ import { sceneUnits } from "../ui/units.js";
 import { niceCeiling } from "../geometry/round.js";
 import { HEAT_STOPS, KIND_COLORS } from "../gl/theme.js";
 import { KINDS, strainGains, tensionGains } from "../state/quantity.js";
-import { ValueScan } from "../state/value-scan.js";
+import { ValueScan } from "./value-scan.js";
 
 /** @typedef {import("../state/quantity.js").Quantity} Quantity */
-/** @typedef {import("../state/value-scan.js").Extremes} Extremes */
+/** @typedef {import("./value-scan.js").Extremes} Extremes */
 
 /** Time between two scans of a moving scene, in ms. */
 const SCAN_INTERVAL_MS = 250;

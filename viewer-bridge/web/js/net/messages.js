@@ -14,14 +14,17 @@
  * }} NodeState
  * @typedef {Record<string, ParameterValue | Record<string, ParameterValue>>} Values
  * @typedef {{ type: "parameters", is_complete: boolean, values: Values | null, initial: Values | null }} Parameters
- * @typedef {{ type: "outcome", id: number | null, kind: string, status: "applied" | "rejected" | "unanswered", step: number | null, applied: number, rejected: number, reason: string, text: string }} OutcomeMessage
+ * @typedef {{ type: "outcome", id: number | null, kind: string, status: "applied" | "rejected" | "unanswered", step: number | null, applied: number, rejected: number, reason: string, text: string, state_step: number | null }} OutcomeMessage
  * @typedef {{ kind: "tear" | "pin" | "command" | "late", step: number, count: number }} Mark
  * @typedef {{
  *   type: "timeline", file: string, scene: string, rate_hz: number, first_step: number, last_step: number,
  *   first_time_s: number, last_time_s: number, marks: Mark[], hashes: string, hash_text: string,
  * }} TimelineMessage
  * @typedef {{ type: "playback", is_playing: boolean, rate: number, is_looping: boolean, step: number, time_s: number }} Playback
- * @typedef {Hello | NodeState | Parameters | OutcomeMessage | TimelineMessage | Playback | { type: "clients", count: number }
+ * @typedef {{ type: "history", first_step: number | null, marks: Mark[], text: string }} HistoryMessage
+ * @typedef {"cut" | "reset" | "load" | "rewind"} Undoable
+ * @typedef {{ type: "undoable", what: Undoable | null }} UndoableMessage
+ * @typedef {Hello | NodeState | Parameters | OutcomeMessage | TimelineMessage | Playback | HistoryMessage | UndoableMessage | { type: "clients", count: number }
  *   | { type: "reset", step: number } | { type: "notice", level: string, text: string }} TextMessage
  */
 

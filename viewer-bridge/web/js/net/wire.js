@@ -52,7 +52,8 @@
  * @typedef {Header & { kind: "speeds", speeds: Float32Array }} Speeds
  * @typedef {{ particle: number, position: Vec3, velocity: Vec3, inverseMass: number }} InspectedRow
  * @typedef {Header & { kind: "inspected", rows: InspectedRow[] }} Inspected
- * @typedef {Scene | Frame | Tear | Pins | Stats | Colliders | Forces | Speeds | Inspected} Message
+ * @typedef {Header & { kind: "past", count: number }} Past
+ * @typedef {Scene | Frame | Tear | Pins | Stats | Colliders | Forces | Speeds | Inspected | Past} Message
  */
 
 /** Flags of a particle in PINS. */
@@ -129,6 +130,7 @@ const DECODERS = /** @type {Record<number, (reader: Reader, header: Header) => M
   8: decodeForces,
   9: decodeSpeeds,
   10: decodeInspected,
+  11: decodePast,
 });
 
 /**
@@ -313,4 +315,11 @@ function decodeInspected(reader, header) {
   const rows = [];
   for (let row = 0; row < count; row++) rows.push({ particle: reader.u32(), position: reader.f32x3(), velocity: reader.f32x3(), inverseMass: reader.f32() });
   return { kind: "inspected", ...header, rows };
+}
+
+/** @param {Reader} reader @param {Header} header @returns {Past} */
+function decodePast(reader, header) {
+  const count = reader.u32();
+  reader.u32();
+  return { kind: "past", ...header, count };
 }

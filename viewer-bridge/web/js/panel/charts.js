@@ -112,6 +112,8 @@ export class Charts {
   /** @param {import("../net/wire.js").Frame} frame */
   addFrame(frame) {
     const { simulation } = this.app;
+    // The plots go on to show the present while the page looks back, but its frames are not shown.
+    if (simulation.isLookingBack) return;
     const time = frame.simTime;
     const { low, high } = heights(frame, simulation.axes().up);
     this.series.lowest.push(time, low);

@@ -3,6 +3,7 @@
 
 import { Emitter } from "./emitter.js";
 import { lowestReach } from "./hanging.js";
+import { LiveState, flagsOf, updateTorn } from "./live-state.js";
 import { Topology } from "./topology.js";
 import { PIN } from "../net/wire.js";
 import { sceneAxes } from "../geometry/camera.js";
@@ -23,6 +24,7 @@ import { add, boxOf, dot, length, scale, subtract } from "../geometry/math.js";
 /** @typedef {import("../net/messages.js").Parameters} Parameters */
 /** @typedef {import("../net/messages.js").TimelineMessage} TimelineMessage */
 /** @typedef {import("../net/messages.js").Playback} Playback */
+/** @typedef {import("../net/messages.js").HistoryMessage} HistoryMessage */
 /** @typedef {import("../net/messages.js").TextMessage} TextMessage */
 /** A floor: normal · x = offset. @typedef {{ normal: Vec3, offset: number }} Plane */
 
@@ -35,6 +37,7 @@ const FLOOR_COSINE = 0.99;
  *   hello: Hello, node: NodeState, parameters: Parameters, timeline: TimelineMessage | null, playback: Playback | null,
  *   outcome: import("../net/messages.js").OutcomeMessage, reset: number,
  *   notice: { level: string, text: string }, ground: void, connection: boolean,
+ *   history: HistoryMessage | null, undoable: void, past: number | null, present: Frame,
  * }} Topics
  */
 
@@ -83,6 +86,16 @@ export class Simulation extends Emitter {
     this.timeline = null;
     /** @type {Playback | null} */
     this.playback = null;
+    /** The past of a live simulation that the page can look back at. @type {HistoryMessage | null} */
+    this.history = null;
+    /** The newest change of this page that it can undo. @type {import("../net/messages.js").Undoable | null} */
+    this.undoable = null;
+    /** The present, while the page looks at an earlier state. Everything else is that state then. @type {LiveState | null} */
+    this.live = null;
+    /** Number of the next messages that show an earlier state, and whether they belong to the scene. */
+    this.announced = { count: 0, isShown: false };
+    /** Cuts that the node has yet to publish, since the last frame. @type {number[]} */
+    this.expectedCuts = [];
     /** The floor of the scene, which is drawn because it holds. @type {Plane | null} */
     this.ground = null;
     /** The lowest height that the scene can hang to; null if it falls. @type {number | null} */
@@ -120,6 +133,12 @@ export class Simulation extends Emitter {
 
   /** Applies a binary message; drops one whose epoch is not that of the scene. @param {Message} message */
   receive(message) {
+    if (this.announced.count > 0) {
+      this.announced.count--;
+      if (this.announced.isShown) this.show(message);
+      return;
+    }
+    if (message.kind === "past") return this.beginPast(message);
     if (message.kind === "stats") {
       this.stats = message;
       return this.emit("stats", message);
@@ -127,17 +146,73 @@ export class Simulation extends Emitter {
     if (message.kind === "frame") this.frameNumber = message.number;
     if (message.kind === "scene") return this.receiveScene(message);
     if (this.scene === null || message.epoch !== this.scene.epoch) return;
+    if (message.kind === "frame" && message.step !== this.present?.step) this.expectedCuts = [];
+    if (this.live === null) return this.show(message);
+    this.live.receive(message);
+    if (message.kind !== "frame") return;
+    if (this.live.isDue) this.returnToPresent();
+    else this.emit("present", message);
+  }
+
+  /** Shows a message: of the present, or of the state that the page looks back at. @param {Message} message */
+  show(message) {
     if (message.kind === "frame") this.receiveFrame(message);
     else if (message.kind === "tear") this.receiveTear(message);
     else if (message.kind === "pins") this.receivePins(message);
     else if (message.kind === "forces") this.awaiting.forces = message;
     else if (message.kind === "speeds") this.awaiting.speeds = message;
     else if (message.kind === "inspected") this.awaiting.inspected = message;
-    else this.receiveColliders(message.colliders);
+    else if (message.kind === "colliders") this.receiveColliders(message.colliders);
+  }
+
+  /** Begins to show an earlier state: the next messages are its parts. @param {import("../net/wire.js").Past} past */
+  beginPast({ epoch, step, count }) {
+    const { frame } = this;
+    const isShown = frame !== null && epoch === this.scene?.epoch && this.live?.returnStep == null;
+    this.announced = { count, isShown };
+    if (!isShown) return;
+    this.live ??= new LiveState(this, frame);
+    this.emit("past", step);
+  }
+
+  /** The page shows an earlier state, and the simulation goes on. */
+  get isLookingBack() {
+    return this.live !== null;
+  }
+
+  /** The newest frame, on show or not. */
+  get present() {
+    return this.live?.frame ?? this.frame;
+  }
+
+  /** Shows the present again. */
+  returnToPresent() {
+    const { live } = this;
+    if (live === null) return;
+    this.live = null;
+    [this.torn, this.tornCauses] = [live.torn, live.tornCauses];
+    [this.pinsReceived, this.pins] = [live.pinsReceived, live.pins];
+    this.emit("pins", undefined);
+    this.receiveColliders(live.colliders);
+    this.awaiting = live.awaiting;
+    this.receiveFrame(live.frame);
+    this.rebuild();
+    this.emit("past", null);
+  }
+
+  /** Returns to the present with the step that shows a rewind. @param {number} step */
+  returnAt(step) {
+    if (this.live === null) return;
+    this.live.returnStep = step;
+    if (this.live.isDue) this.returnToPresent();
   }
 
   /** @param {Scene} scene */
   receiveScene(scene) {
+    const wasLookingBack = this.isLookingBack;
+    this.live = null;
+    this.announced = { count: 0, isShown: false };
+    this.expectedCuts = [];
     this.scene = scene;
     this.topology = new Topology(scene);
     this.frame = null;
@@ -155,6 +230,7 @@ export class Simulation extends Emitter {
     this.emit("scene", scene);
     this.emit("pins", undefined);
     this.emit("colliders", []);
+    if (wasLookingBack) this.emit("past", null);
   }
 
   /** @param {Frame} frame */
@@ -175,11 +251,7 @@ export class Simulation extends Emitter {
   /** @param {import("../net/wire.js").Tear} tear */
   receiveTear(tear) {
     const isAppended = tear.first === this.torn.length;
-    this.torn.length = Math.min(tear.first, this.torn.length);
-    this.tornCauses.length = this.torn.length;
-    // One by one: spreading a long list as arguments overflows the stack.
-    for (const constraint of tear.constraints) this.torn.push(constraint);
-    for (const cause of tear.causes) this.tornCauses.push(cause);
+    updateTorn(this, tear);
     if (!isAppended) return this.rebuild();
     this.topology?.remove(tear.constraints);
     this.emit("tear", undefined);
@@ -189,14 +261,14 @@ export class Simulation extends Emitter {
   rebuild() {
     this.topology?.restore();
     this.topology?.remove(this.torn);
+    if (!this.isLookingBack) this.topology?.remove(this.expectedCuts);
     this.topology?.removeAround(Uint32Array.from(this.nonFinite));
     this.emit("tear", undefined);
   }
 
   /** @param {import("../net/wire.js").Pins} pins */
   receivePins(pins) {
-    this.pinsReceived = new Map();
-    pins.particles.forEach((particle, k) => this.pinsReceived.set(particle, pins.flags[k]));
+    this.pinsReceived = flagsOf(pins);
     this.pins = new Map(this.pinsReceived);
     this.emit("pins", undefined);
     if (!this.groundIsSettled) this.settleGround();
@@ -244,6 +316,7 @@ export class Simulation extends Emitter {
 
   /** Shows an applied pin at once: a paused node publishes it only with its next step. @param {number} particle @param {boolean} isPinned */
   expectPin(particle, isPinned) {
+    if (this.isLookingBack) return;
     const others = (this.pins.get(particle) ?? 0) & ~PIN.pinned;
     if (isPinned) this.pins.set(particle, others | PIN.pinned);
     else if (others !== 0) this.pins.set(particle, others);
@@ -254,6 +327,8 @@ export class Simulation extends Emitter {
   /** Shows an applied cut at once; `torn` changes only when the bridge reports it. @param {number} epoch @param {number[]} constraints */
   expectCut(epoch, constraints) {
     if (epoch !== this.scene?.epoch) return;
+    for (const constraint of constraints) this.expectedCuts.push(constraint);
+    if (this.isLookingBack) return;
     this.topology?.remove(constraints);
     this.emit("tear", undefined);
   }
@@ -261,6 +336,10 @@ export class Simulation extends Emitter {
   /** Drops the recording if a live bridge now serves this address. @param {Hello} hello */
   receiveHello(hello) {
     this.hello = hello;
+    this.history = null;
+    this.undoable = null;
+    this.emit("history", null);
+    this.emit("undoable", undefined);
     if (hello.mode === "live") {
       this.timeline = null;
       this.playback = null;
@@ -273,9 +352,14 @@ export class Simulation extends Emitter {
   /** Reverts expected pins and cuts. If the reset undid them before the bridge published them, no later
    * message corrects the page. */
   receiveReset(step = 0) {
-    this.pins = new Map(this.pinsReceived);
-    this.emit("pins", undefined);
-    this.rebuild();
+    this.expectedCuts = [];
+    // A reset of the present leaves an earlier state on show as it was.
+    const present = this.live ?? this;
+    present.pins = new Map(present.pinsReceived);
+    if (!this.isLookingBack) {
+      this.emit("pins", undefined);
+      this.rebuild();
+    }
     this.emit("reset", step);
   }
 
@@ -304,6 +388,8 @@ export class Simulation extends Emitter {
       case "node": this.node = message; return this.emit("node", message);
       case "parameters": this.parameters = message; return this.emit("parameters", message);
       case "timeline": this.timeline = message; return this.emit("timeline", message);
+      case "undoable": this.undoable = message.what; return this.emit("undoable", undefined);
+      case "history": this.history = message; return this.emit("history", message);
       case "playback": this.playback = message; return this.emit("playback", message);
       case "outcome": return this.emit("outcome", message);
       case "reset": return this.receiveReset(message.step);

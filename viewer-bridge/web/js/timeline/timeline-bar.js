@@ -1,37 +1,50 @@
-// The timeline of a recording: marks, scrubbing and playback. Positions are steps, as in commands.
+// The timeline under the picture: marks, scrubbing and stepping. Positions are steps, as in commands. It
+// shows a recording, or the past of a live simulation.
 
-import { cssColor, enable, find, make, sharpContext } from "../ui/dom.js";
+import { cssColor, enable, find, sharpContext } from "../ui/dom.js";
 import { Scale, SeekGate, clockText, marksByPixel } from "./timeline.js";
 
-/** Rates to choose from; a different rate set by another page is added. */
-const RATES = [0.1, 0.25, 0.5, 1, 2, 5, 10];
+/**
+ * What the timeline shows and moves. `place` is the step on show; null keeps the timeline as it is.
+ * @typedef {{
+ *   name: "live" | "replay", isThere: boolean, rateHz: number, marks: import("../net/messages.js").Mark[], place: number | null,
+ *   range(): { first: number, last: number }, clock(step: number): string,
+ *   seek(step: number, done: () => void): boolean, step(count: number): void, onChange: () => void,
+ * }} Track
+ */
+
 /** Colour and row per kind of mark. */
 const MARKS = { tear: ["--accent", 0], pin: ["--plot-a", 1], command: ["--plot-c", 1], late: ["--plot-b", 2] };
 const ROW_HEIGHT = 5;
-/** Least interval between updates of the clock during playback. */
+/** Least interval between updates of the timeline while time passes, and between drawings of marks that move. */
 const SHOW_INTERVAL_MS = 100;
+const MARKS_INTERVAL_MS = 500;
 
 export class TimelineBar {
-  /** @param {import("../state/simulation.js").Simulation} simulation @param {import("../net/commands.js").Commands} commands */
-  constructor(simulation, commands) {
+  /** @param {import("../state/simulation.js").Simulation} simulation @param {{ replay: Track, live: Track }} tracks */
+  constructor(simulation, tracks) {
     this.simulation = simulation;
-    this.commands = commands;
+    this.tracks = tracks;
     this.element = find("timeline", HTMLElement);
     this.slider = find("seek", HTMLInputElement);
+    this.back = find("back", HTMLButtonElement);
+    this.forward = find("forward", HTMLButtonElement);
     this.canvas = find("marks", HTMLCanvasElement);
     this.clock = find("clock", HTMLOutputElement);
-    this.rate = find("rate", HTMLSelectElement);
-    this.play = find("play", HTMLButtonElement);
-    this.loop = find("loop", HTMLButtonElement);
-    this.hashes = find("hashes", HTMLOutputElement);
     // An answer reopens the gate in the next animation frame, once the step has been drawn.
-    this.gate = new SeekGate((step, done) => commands.run("seek", { step }, () => requestAnimationFrame(() => {
+    this.gate = new SeekGate((step, done) => this.track.seek(step, () => requestAnimationFrame(() => {
       done();
-      if (simulation.frame !== null) this.follow(simulation.frame.step);
+      this.follow(true);
     })));
     this.isScrubbing = false;
     this.shownMs = 0;
+    this.marksMs = 0;
     this.listen();
+    this.show();
+  }
+
+  get track() {
+    return this.simulation.isReplay ? this.tracks.replay : this.tracks.live;
   }
 
   listen() {
@@ -43,92 +56,82 @@ export class TimelineBar {
     });
     // A slider that is released where it was pressed fires no change event.
     for (const type of ["change", "pointerup", "pointercancel", "blur"]) slider.addEventListener(type, () => { this.isScrubbing = false; });
-    find("back", HTMLButtonElement).addEventListener("click", () => this.step(-1));
-    find("forward", HTMLButtonElement).addEventListener("click", () => this.step(1));
-    this.play.addEventListener("click", () => this.togglePlay());
-    this.loop.addEventListener("click", () => this.commands.run("loop", { is_on: !(simulation.playback?.is_looping ?? false) }));
-    this.rate.addEventListener("change", () => this.commands.run("rate", { value: Number(this.rate.value) }));
+    this.back.addEventListener("click", () => this.step(-1));
+    this.forward.addEventListener("click", () => this.step(1));
     new ResizeObserver(() => this.drawMarks()).observe(this.canvas);
-    simulation.on("timeline", () => this.showRecording());
-    simulation.on("playback", () => this.showPlayback());
-    simulation.on("frame", (frame) => this.follow(frame.step));
+    for (const track of [this.tracks.replay, this.tracks.live]) track.onChange = () => this.show();
+    simulation.on("hello", () => this.show());
     simulation.on("connection", () => this.showConnection());
+    // No frame may follow that of a pause or of the past.
+    simulation.on("frame", () => this.follow(simulation.isPaused || simulation.isLookingBack));
+    simulation.on("present", () => this.follow(false));
   }
 
-  /** Disables the controls without a connection. */
+  /** Ends a scrub, because a slider that is disabled meanwhile reports no release. */
   showConnection() {
-    const reason = this.simulation.isConnected ? "" : "There is no connection to the bridge.";
-    for (const control of this.element.querySelectorAll("button, input, select")) enable(/** @type {HTMLButtonElement} */ (control), reason);
-    // A disabled slider reports no release.
     this.isScrubbing = false;
-    this.showPlayback();
+    this.show();
   }
 
-  togglePlay() {
-    this.commands.run(this.simulation.playback?.is_playing ? "pause" : "resume");
+  /** The reason why the timeline cannot be moved, or "". */
+  reasonAgainst() {
+    if (!this.simulation.isConnected) return "There is no connection to the bridge.";
+    return this.track.isThere ? "" : "There is nothing to show yet.";
   }
 
   /** @param {number} count */
   step(count) {
-    if (this.simulation.playback?.is_playing) this.commands.run("pause");
-    this.commands.run("step", { count });
+    if (this.track.isThere) this.track.step(count);
   }
 
-  showRecording() {
-    const { timeline } = this.simulation;
-    this.element.hidden = timeline === null;
-    if (timeline === null) return;
-    this.slider.min = String(timeline.first_step);
-    this.slider.max = String(timeline.last_step);
-    this.hashes.textContent = timeline.hash_text;
-    this.hashes.classList.toggle("is-good", timeline.hashes === "verified");
-    this.hashes.classList.toggle("is-bad", timeline.hashes === "diverged");
-    this.hashes.title = timeline.file;
-    this.drawMarks();
+  /** Shows the range and the marks of the track. An empty timeline keeps its place, so that the picture never jumps. */
+  show() {
+    const { track } = this;
+    this.element.dataset.track = track.name;
+    this.element.setAttribute("aria-label", track.name === "live" ? "History" : "Recording");
+    const reason = this.reasonAgainst();
+    for (const control of [this.back, this.forward, this.slider]) enable(control, reason);
+    this.marksMs = 0;
+    this.follow(true);
+    if (this.marksMs === 0) this.drawMarks();
   }
 
-  showPlayback() {
-    const { playback, isConnected } = this.simulation;
-    if (playback === null) return;
-    const isPlaying = playback.is_playing && isConnected;
-    this.play.setAttribute("aria-pressed", String(isPlaying));
-    this.play.setAttribute("aria-label", isPlaying ? "Pause" : "Play");
-    this.loop.setAttribute("aria-pressed", String(playback.is_looping));
-    const rates = [...new Set([...RATES, playback.rate])].sort((a, b) => a - b);
-    this.rate.replaceChildren(...rates.map((rate) => make("option", { value: rate, selected: rate === playback.rate }, `${rate} ×`)));
-    this.follow(playback.step);
-  }
-
-  /** Moves the slider to the shown step, except while the user scrubs or a seek is in flight. @param {number} step */
-  follow(step) {
-    if (this.element.hidden || this.isScrubbing || this.gate.isBusy) return;
-    this.slider.valueAsNumber = step;
+  /** Moves the slider to the step on show, except while the user scrubs or a seek is in flight. @param {boolean} isUrgent shows it at once */
+  follow(isUrgent) {
+    const { track, slider } = this;
+    if (!track.isThere || this.isScrubbing || this.gate.isBusy || track.place === null) return;
     const now = performance.now();
-    if (now - this.shownMs < SHOW_INTERVAL_MS && !this.simulation.isPaused) return;
+    if (!isUrgent && now - this.shownMs < SHOW_INTERVAL_MS) return;
     this.shownMs = now;
-    this.showStep(step);
+    const { first, last } = track.range();
+    const isMoved = slider.min !== String(first) || slider.max !== String(last);
+    if (isMoved) [slider.min, slider.max] = [String(first), String(last)];
+    slider.valueAsNumber = track.place;
+    this.showStep(track.place);
+    if (this.marksMs !== 0 && (!isMoved || now - this.marksMs < MARKS_INTERVAL_MS)) return;
+    this.marksMs = now;
+    this.drawMarks();
   }
 
   /** @param {number} step */
   showStep(step) {
-    const rate = this.simulation.timeline?.rate_hz ?? 1;
-    const last = this.simulation.timeline?.last_step ?? 0;
-    this.clock.textContent = `${clockText(step / rate)} / ${clockText(last / rate)}`;
-    this.slider.setAttribute("aria-valuetext", `step ${step}, ${clockText(step / rate)}`);
+    const { track } = this;
+    this.clock.textContent = track.clock(step);
+    this.slider.setAttribute("aria-valuetext", `step ${step}, ${clockText(step / track.rateHz)}`);
   }
 
   drawMarks() {
-    const { timeline } = this.simulation;
-    if (timeline === null || this.element.hidden) return;
+    const { track, slider } = this;
     const { context, width } = sharpContext(this.canvas);
-    const scale = new Scale(timeline.first_step, timeline.last_step);
-    for (const [kind, pixels] of marksByPixel(timeline.marks, scale, width)) {
+    const scale = new Scale(Number(slider.min), Number(slider.max));
+    const marks = track.marks.filter(({ step }) => step >= scale.first);
+    for (const [kind, pixels] of marksByPixel(marks, scale, width)) {
       const [color, row] = MARKS[/** @type {keyof typeof MARKS} */ (kind)] ?? ["--soft", 1];
       context.fillStyle = cssColor(String(color));
       for (const pixel of pixels.keys()) context.fillRect(pixel - 0.5, Number(row) * ROW_HEIGHT, 2, ROW_HEIGHT - 1);
     }
     const counts = new Map();
-    for (const { kind, count } of timeline.marks) counts.set(kind, (counts.get(kind) ?? 0) + count);
+    for (const { kind, count } of marks) counts.set(kind, (counts.get(kind) ?? 0) + count);
     this.canvas.title = [...counts].map(([kind, count]) => `${kind}: ${count}`).join(", ");
   }
 }

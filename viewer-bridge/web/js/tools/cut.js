@@ -9,6 +9,9 @@ import { crossedSticks, projectAll } from "../geometry/pick.js";
 /** Points of a stroke that stay drawn. */
 const STROKE_POINTS_MAX = 60;
 
+/** Number of the last stroke. The cuts of a stroke are undone together. */
+let lastStroke = 0;
+
 /** Cuts every constraint that meets the pointer, whichever of the two moves. @implements {Tool} */
 export class CutTool {
   /** @param {App} app @param {Pixel} start */
@@ -24,6 +27,7 @@ export class CutTool {
     this.scene = app.simulation.scene;
     /** Constraints that were sent already. @type {Set<number>} */
     this.sent = new Set();
+    this.number = ++lastStroke;
   }
 
   /** @param {Pixel} to */
@@ -47,7 +51,7 @@ export class CutTool {
     const countMax = simulation.hello?.limits.constraints_per_cut ?? 256;
     for (let first = 0; first < crossed.length; first += countMax) {
       const constraints = crossed.slice(first, first + countMax);
-      const isSent = commands.run("cut", { epoch: scene.epoch, constraints }, ({ status }) => {
+      const isSent = commands.run("cut", { epoch: scene.epoch, constraints, stroke: this.number }, ({ status }) => {
         if (status === "applied" && simulation.isPaused) simulation.expectCut(scene.epoch, constraints);
       });
       if (isSent) for (const one of constraints) this.sent.add(one);

@@ -17,14 +17,14 @@ export class Controls {
   /**
    * @param {import("../tools/tool.js").App} app @param {import("../tools/input.js").Input} input
    * @param {import("./views.js").Views} views @param {{ step(count: number): void }} timeline
-   * @param {import("./banner.js").Banner} banner
+   * @param {import("./undo.js").Undo} undo
    */
-  constructor(app, input, views, timeline, banner) {
+  constructor(app, input, views, timeline, undo) {
     this.app = app;
     this.input = input;
     this.views = views;
     this.timeline = timeline;
-    this.banner = banner;
+    this.undo = undo;
     this.pause = find("pause", HTMLButtonElement);
     this.step = find("step", HTMLButtonElement);
     this.reset = find("reset", HTMLButtonElement);
@@ -44,7 +44,7 @@ export class Controls {
     /** The scene that is being loaded, for quick presses of a key. @type {string | null} */
     this.requested = null;
     for (const topic of /** @type {const} */ (["scene", "connection"])) simulation.on(topic, () => { this.requested = null; });
-    for (const topic of /** @type {const} */ (["hello", "node", "playback", "scene", "parameters", "connection"])) simulation.on(topic, () => this.show());
+    for (const topic of /** @type {const} */ (["hello", "node", "playback", "scene", "parameters", "connection", "past", "undoable"])) simulation.on(topic, () => this.show());
   }
 
   listen() {
@@ -68,9 +68,10 @@ export class Controls {
     /** @type {import("./keys.js").Keymap} */
     const keymap = {
       " ": () => this.togglePause(),
-      ".": () => this.stepOnce(1),
-      ",": () => { if (app.simulation.isReplay) this.stepOnce(-1); },
+      ".": () => (app.simulation.isLookingBack ? this.timeline.step(1) : this.stepOnce(1)),
+      ",": () => this.timeline.step(-1),
       r: () => { if (!this.reset.disabled) app.commands.run("reset"); },
+      "ctrl+z": () => this.undo.run(),
       f: () => views.fit(),
       s: () => views.savePicture(),
       v: () => this.togglePanel(),
@@ -96,10 +97,7 @@ export class Controls {
       ArrowDown: () => this.arrow(0, 1),
       i: () => this.onInspect(),
       t: () => this.onFollow(),
-      Escape: () => {
-        this.input.finish();
-        app.selection.clear();
-      },
+      Escape: () => this.escape(),
     };
     for (let digit = 1; digit <= 9; digit++) keymap[digit] = () => this.loadNumber(digit - 1);
     return keymap;
@@ -108,7 +106,7 @@ export class Controls {
   /** @param {number} x @param {number} y */
   arrow(x, y) {
     const { camera, renderer, simulation } = this.app;
-    if (simulation.isReplay && x !== 0) return this.stepOnce(x);
+    if ((simulation.isReplay || simulation.isLookingBack) && x !== 0) return this.timeline.step(x);
     if (camera.isFlat) camera.pan(-x * KEY_PIXELS, -y * KEY_PIXELS, renderer.viewport);
     else camera.orbit(-x * KEY_PIXELS, -y * KEY_PIXELS);
     renderer.isDirty = true;
@@ -119,6 +117,14 @@ export class Controls {
     const { camera, renderer } = this.app;
     camera.zoom(factor, renderer.viewport.width / 2, renderer.viewport.height / 2, renderer.viewport);
     renderer.isDirty = true;
+  }
+
+  /** Ends what is going on: a look back, or else the tool in use and the selection. */
+  escape() {
+    const { simulation, selection } = this.app;
+    if (simulation.isLookingBack) return simulation.returnToPresent();
+    this.input.finish();
+    selection.clear();
   }
 
   togglePause() {
@@ -182,20 +188,22 @@ export class Controls {
 
   canChange() {
     const { simulation } = this.app;
-    return simulation.isAlive && !simulation.isRecording;
+    return simulation.isAlive && !simulation.isRecording && !simulation.isLookingBack;
   }
 
   /** Updates the controls. The tooltip of a disabled control gives the reason. */
   show() {
     const { simulation } = this.app;
     const gone = simulation.isAlive ? "" : simulation.isConnected ? "No node is running." : "There is no connection to the bridge.";
-    const recorded = (/** @type {string} */ reason) => gone || (simulation.isRecording ? reason : "");
+    const past = gone || (simulation.isLookingBack ? "You are looking at an earlier state. Return to the present first (Esc)." : "");
+    const recorded = (/** @type {string} */ reason) => past || (simulation.isRecording ? reason : "");
     const isPaused = simulation.isPaused && gone === "";
     this.pause.setAttribute("aria-pressed", String(isPaused));
     setText(this.pause, isPaused ? "Resume" : "Pause");
     enable(this.pause, gone);
-    enable(this.step, gone);
+    enable(this.step, past);
     enable(this.reset, recorded("A recording cannot be reset. Use the timeline to go back."));
+    enable(this.undo.button, recorded("A recording has nothing to undo.") || this.undo.reasonAgainst());
     for (const button of this.modes) enable(button, recorded("A recording cannot be changed."));
     this.sceneName.textContent = this.name() ?? "No scene";
     this.scene.value = this.name() ?? "";

@@ -32,7 +32,7 @@ export class Hud {
     if (frame === null || scene === null) return "";
     const factor = stats === null || !Number.isFinite(stats.realTimeFactor) ? "" : ` · ${trim(stats.realTimeFactor)} × real time`;
     // A paused scene is drawn on demand, so it has no meaningful rate.
-    const pace = !this.simulation.isAlive ? " · last state" : this.simulation.isPaused ? " · paused" : `${factor} · ${drawnPerSecond} fps`;
+    const pace = this.simulation.isLookingBack ? " · in the past" : !this.simulation.isAlive ? " · last state" : this.simulation.isPaused ? " · paused" : `${factor} · ${drawnPerSecond} fps`;
     const tears = torn.length > 0 ? ` · ${torn.length} torn` : "";
     return `step ${frame.step} · ${frame.simTime.toFixed(2)} s${pace} · ${scene.particleCount} particles · ${scene.constraintCount} constraints${tears}`;
   }

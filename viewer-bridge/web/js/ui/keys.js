@@ -1,6 +1,6 @@
 // Keyboard shortcuts: one table from keys to actions.
 
-/** @typedef {Record<string, () => void>} Keymap  keyed by KeyboardEvent.key, with letters in lower case */
+/** @typedef {Record<string, () => void>} Keymap  keyed by KeyboardEvent.key, with letters in lower case; "ctrl+" stands before a key with Ctrl or Cmd */
 
 /** Keys that move the choice of a focused list or slider. */
 const MOVES = new Set(["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "Home", "End", "PageUp", "PageDown"]);
@@ -20,16 +20,27 @@ export function isConsumed({ tagName, type = "" }, key) {
   return tagName === "TEXTAREA";
 }
 
+/** The name of a pressed key in a keymap, or null for a combination that the browser keeps.
+ * @param {{ key: string, ctrlKey: boolean, metaKey: boolean, altKey: boolean, shiftKey: boolean, repeat: boolean }} event */
+export function keyName({ key, ctrlKey, metaKey, altKey, shiftKey, repeat }) {
+  const name = key.length === 1 ? key.toLowerCase() : key;
+  if (altKey) return null;
+  if (!ctrlKey && !metaKey) return name;
+  // A held key would undo everything.
+  return shiftKey || repeat ? null : `ctrl+${name}`;
+}
+
 /** @param {Keymap} keymap */
 export function listenToKeys(keymap) {
   // A click on the picture focuses it too, but only focus by Tab shows the focus ring.
   document.addEventListener("pointerdown", () => { delete document.documentElement.dataset.tabbed; });
   document.addEventListener("keydown", (event) => {
     if (event.key === "Tab") document.documentElement.dataset.tabbed = "";
-    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const name = keyName(event);
+    if (name === null) return;
     const control = event.target instanceof Element ? event.target.closest("button, input, select, textarea") : null;
     if (document.querySelector("dialog[open]") !== null || (control !== null && isConsumed(/** @type {HTMLInputElement} */ (control), event.key))) return;
-    const action = keymap[event.key.length === 1 ? event.key.toLowerCase() : event.key];
+    const action = keymap[name];
     if (action === undefined) return;
     event.preventDefault();
     action();

@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { complianceOf, strainGains, tensionGains, valueAt } from "../../js/state/quantity.js";
-import { ValueScan } from "../../js/state/value-scan.js";
+import { ValueScan } from "../../js/legend/value-scan.js";
 import { Topology, FAN_WORDS } from "../../js/state/topology.js";
 import { tensionNote } from "../../js/legend/color-legend.js";
 import { unitIn, unitsOf } from "../../js/ui/units.js";

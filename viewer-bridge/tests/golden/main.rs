@@ -1,8 +1,10 @@
-//! Golden files with every message of the protocol: `golden/messages.json` has the bytes and fields of
-//! the binary messages, `golden/texts.json` the texts. The decoder of the page is tested on them too.
+//! Golden files with every message of the protocol: `messages.json` has the bytes and fields of
+//! the binary messages, `texts.json` the texts. The decoder of the page is tested on them too.
 //!
 //! `UPDATE_GOLDEN=1` rewrites the files; review the difference.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a panic is how a test fails")]
+
+mod texts;
 
 use std::fmt::Write;
 use std::fs;
@@ -10,19 +12,14 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 use sim_contract::{
-    ColliderShape, ColliderState, ConstraintState, ForceKind, ForceRow, ParameterValues,
-    ParticleFlags, ParticleState, Reason, TearCause, TornConstraint, Triangle,
+    ColliderShape, ColliderState, ConstraintState, ForceKind, ForceRow, ParticleFlags,
+    ParticleState, TearCause, TornConstraint, Triangle,
 };
 use sim_solver::scene::ColliderMesh;
-use viewer_bridge::message::{
-    Choice, FromPage, Hashes, Level, Mark, MarkKind, Mode, Node, NodeState, OutcomeText,
-    PageLimits, ParametersText, Playback, Refusal, Status, Timeline, ToPage, Welcome,
-};
-use viewer_bridge::scene::catalog::Catalog;
 use viewer_bridge::wire::{
-    Bounds, Colliders, Forces, Format, FrameHead, FrameLimits, Inspected, Message, Percentiles,
-    Pins, Scene, SceneText, ShapeText, Speeds, Stamp, Statistics, Tear, decode, encode_frame,
-    frame_flag, scene_flag,
+    Bounds, Colliders, Forces, Format, FrameHead, FrameLimits, Inspected, Message, Past,
+    Percentiles, Pins, Scene, SceneText, ShapeText, Speeds, Stamp, Statistics, Tear, decode,
+    encode_frame, frame_flag, scene_flag,
 };
 
 const STAMP: Stamp = Stamp { epoch: 3, step: 1200 };
@@ -190,6 +187,7 @@ fn messages() -> Vec<(&'static str, Vec<u8>)> {
         ("forces", forces().encode().to_vec()),
         ("speeds", Speeds::from_particles(STAMP, &particles()).encode().to_vec()),
         ("inspected", inspected().encode().to_vec()),
+        ("past", Past { stamp: STAMP, count: 4 }.encode().to_vec()),
     ]
 }
 
@@ -252,6 +250,9 @@ fn fields(message: &Message) -> Value {
                 "rotation": one.rotation, "a": one.a, "b": one.b,
                 "velocity": one.velocity, "angular_velocity": one.angular_velocity,
             })).collect::<Vec<_>>(),
+        }),
+        Message::Past(past) => json!({
+            "kind": 11, "epoch": past.stamp.epoch, "step": past.stamp.step, "count": past.count,
         }),
         wish => wished_fields(wish),
     }
@@ -363,135 +364,4 @@ fn a_particle_far_away_does_not_reduce_the_resolution_of_the_others() {
     assert_eq!(frame.not_finite, [3]);
     assert!(frame.scale[0] < 1e-3, "{:?}", frame.scale);
     assert!((frame.positions[2][0] - 1.0).abs() <= frame.scale[0]);
-}
-
-fn to_page() -> Vec<ToPage> {
-    let outcome = OutcomeText {
-        id: Some(7),
-        kind: "cut",
-        status: Status::Applied,
-        step: Some(1234),
-        applied: 3,
-        rejected: 1,
-        reason: Some(Reason::AlreadyTorn.into()),
-        text: "the constraint is already torn".to_owned(),
-    };
-    let parameters = ParameterValues { tear_force: Some(20.0), ..ParameterValues::default() };
-    vec![
-        ToPage::Hello(Box::new(Welcome {
-            protocol: 2,
-            version: "0.1.0",
-            client: 3,
-            mode: Mode::Live,
-            format: Choice::Auto,
-            scenes: Catalog::default().entries().to_vec(),
-            limits: PageLimits::default(),
-        })),
-        ToPage::Node(Node { text: "no node runs".to_owned(), ..Node::default() }),
-        ToPage::Node(Node {
-            state: NodeState::Alive,
-            text: String::new(),
-            run_id: Some("0123456789abcdef".to_owned()),
-            scene: Some("curtain".to_owned()),
-            method: Some("xpbd"),
-            rate_hz: 240,
-            is_paused: false,
-            is_replay: false,
-            time_scale: 1.0,
-            process_id: Some(4711),
-        }),
-        ToPage::Parameters(Box::new(ParametersText {
-            is_complete: true,
-            values: Some(parameters),
-            initial: Some(ParameterValues::default()),
-        })),
-        ToPage::Outcome(outcome.clone()),
-        ToPage::Outcome(OutcomeText {
-            id: None,
-            status: Status::Unanswered,
-            step: None,
-            applied: 0,
-            rejected: 0,
-            reason: Some(Refusal::NoAnswer),
-            text: "the node did not answer; the command may still take effect".to_owned(),
-            ..outcome
-        }),
-        ToPage::Reset { step: 1300 },
-        ToPage::Clients { count: 2 },
-        ToPage::Notice { level: Level::Warning, text: "look".to_owned() },
-    ]
-}
-
-fn to_page_of_a_replay() -> Vec<ToPage> {
-    vec![
-        ToPage::Timeline(Box::new(Timeline {
-            file: "run.mcap".to_owned(),
-            scene: "curtain".to_owned(),
-            rate_hz: 240,
-            first_step: 0,
-            last_step: 2400,
-            first_time_s: 0.0,
-            last_time_s: 10.0,
-            marks: [MarkKind::Tear, MarkKind::Pin, MarkKind::Command, MarkKind::Late]
-                .map(|kind| Mark { kind, step: 60, count: 1 })
-                .to_vec(),
-            hashes: Hashes::Checking,
-            hash_text: "checking hashes".to_owned(),
-        })),
-        ToPage::Playback(Playback {
-            is_playing: true,
-            rate: 1.0,
-            is_looping: false,
-            step: 240,
-            time_s: 1.0,
-        }),
-    ]
-}
-
-/// One message of each kind that a page may send.
-const FROM_PAGE: [&str; 29] = [
-    r#"{"type":"hello","protocol":2,"token":"00","format":"u16"}"#,
-    r#"{"type":"hello","protocol":2}"#,
-    r#"{"type":"ack","frame":77}"#,
-    r#"{"type":"forces","is_on":true}"#,
-    r#"{"type":"speeds","is_on":true}"#,
-    r#"{"type":"inspect","particles":[0,7]}"#,
-    r#"{"type":"grab","particle":90,"target":[0.5,0.2,0.3],"over_s":0.05,"id":1}"#,
-    r#"{"type":"move","particle":90,"target":[0.5,0.4,0.3]}"#,
-    r#"{"type":"release","particle":90}"#,
-    r#"{"type":"brush","eye":[0,0,5],"ray":[0,0,-1],"radius":0.2,"delta":[0.01,0,0],"over_s":0.016,"cap":0.05}"#,
-    r#"{"type":"push","center":[0,1,0],"radius":0.3,"delta":[0,0,0.02],"limit":0.05}"#,
-    r#"{"type":"pin","particle":3}"#,
-    r#"{"type":"unpin","particle":3}"#,
-    r#"{"type":"cut","epoch":3,"constraints":[1,2,3],"id":2}"#,
-    r#"{"type":"cut_segment","from":[-1,0,0],"to":[1,0,0],"direction":[0,0,1]}"#,
-    r#"{"type":"cut_radius","center":[0,0,0],"radius":0.1}"#,
-    r#"{"type":"move_collider","collider":0,"translation":[0.5,0,0],"rotation":[0,0.6,0,0.8]}"#,
-    r#"{"type":"move_anchor","anchor":0,"translation":[0,0.3,0]}"#,
-    r#"{"type":"pause"}"#,
-    r#"{"type":"resume"}"#,
-    r#"{"type":"step","count":10}"#,
-    r#"{"type":"reset"}"#,
-    r#"{"type":"load","scene":"rope"}"#,
-    r#"{"type":"set","parameter":"gravity","value":[0,-1.62,0]}"#,
-    r#"{"type":"set","parameter":"tear_force","value":null}"#,
-    r#"{"type":"set","parameter":"compliance","value":0.0001,"constraint_kind":"shear"}"#,
-    r#"{"type":"seek","step":1200}"#,
-    r#"{"type":"rate","value":0.5}"#,
-    r#"{"type":"loop","is_on":true}"#,
-];
-
-#[test]
-fn the_texts_are_frozen() {
-    for text in FROM_PAGE {
-        FromPage::parse(text).unwrap_or_else(|error| panic!("{text}: {error}"));
-    }
-    let parse = |text: &str| serde_json::from_str::<Value>(text).unwrap();
-    let to_page: Vec<_> = to_page()
-        .into_iter()
-        .chain(to_page_of_a_replay())
-        .map(|message| parse(&message.to_json()))
-        .collect();
-    let from_page: Vec<_> = FROM_PAGE.iter().map(|text| parse(text)).collect();
-    check("texts.json", &json!({ "to_page": to_page, "from_page": from_page }));
 }

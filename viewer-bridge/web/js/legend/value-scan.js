@@ -1,7 +1,7 @@
 // Finds the least and greatest value of the picture's quantity, and the end of its scale. A large scene is
 // scanned in slices, one per animation frame, but always in one frame of the simulation.
 
-import { valueAt } from "./quantity.js";
+import { valueAt } from "../state/quantity.js";
 
 /** @typedef {import("../net/wire.js").Frame} Frame */
 /** Extremes of the known values; `most` is the 98th percentile of their magnitudes, and `resolution` what the

@@ -2,8 +2,8 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { formatLink, parseLink } from "../js/ui/link.js";
-import { Scale, SeekGate, clockText, marksByPixel } from "../js/timeline/timeline.js";
+import { formatLink, parseLink } from "../../js/ui/link.js";
+import { Scale, SeekGate, clockText, marksByPixel } from "../../js/timeline/timeline.js";
 
 test("a step and its position on the timeline convert back, including at both ends", () => {
   const scale = new Scale(100, 340);
