@@ -108,7 +108,7 @@ pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
     let position = Arc::new(WritePosition::default());
     let intake = Intake::new(args.steps);
     let writing = writing::start(Arc::clone(&queue), Arc::clone(&position), options, file)?;
-    let live = LiveLine::new(Arc::clone(&queue), Arc::clone(&position));
+    let live = LiveLine::new(Arc::clone(&queue), Arc::clone(&position), args.progress);
     let feed = Feed::new(intake, Arc::clone(&queue), position, args.split.clone());
     let mut recording = Recording {
         tap,
@@ -204,7 +204,9 @@ impl Recording {
             if args.black_box.is_none() && self.signal.take() {
                 output::note(IGNORED_SIGNAL);
             }
-            self.live.update(&self.feed);
+            if !self.live.update(&self.feed)? {
+                return Ok(StopReason::ReaderGone);
+            }
             // In the lockstep, the node waits until the queue has room.
             if (self.queue.size_bytes() as u64) < args.queue_bytes / 2 {
                 self.tap.ready()?;

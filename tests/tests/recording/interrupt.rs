@@ -2,6 +2,7 @@
 //! that holds the steps of that time.
 
 use integration_tests::{Process, Program, Sandbox, Signal, ctl, record, wait_for};
+use serde_json::Value;
 
 use super::raw::small;
 
@@ -33,6 +34,41 @@ fn sigusr1_does_not_end_a_recording_without_a_black_box() {
     assert_eq!(recording.interrupt().code, Some(0));
     let verified = Process::run(Program::Recorder, &sandbox, &["verify", &file]).success();
     assert!(verified.contains("20 steps bit-identical"), "{verified}");
+}
+
+#[test]
+fn a_recording_prints_its_progress_for_a_program() {
+    let sandbox = Sandbox::new();
+    let _node = Process::start_ready(Program::SimNode, &sandbox, &["run", "rope"]);
+    let file = sandbox.path("run.mcap");
+    let args = ["record", "-o", &file, "--progress", "--json"];
+    let mut recording = Process::start(Program::Recorder, &sandbox, &args);
+    wait_for("a line with snapshots and a size", || {
+        let lines = recording.wait_for_output(1);
+        let last: Value = serde_json::from_str(lines.last()?).unwrap();
+        let number = |name: &str| last[name].as_f64().unwrap();
+        assert!(number("seconds") > 0.0 && last["lost"].is_object(), "{last}");
+        (number("snapshots") > 0.0 && number("size_bytes") > 0.0).then_some(())
+    });
+    let ended = recording.interrupt();
+    assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+    let report: Value = serde_json::from_str(ended.stdout.lines().last().unwrap()).unwrap();
+    assert_eq!(report["stop_reason"], "signal");
+}
+
+#[test]
+fn a_recording_ends_cleanly_when_the_reader_of_its_progress_has_gone() {
+    let sandbox = Sandbox::new();
+    let _node = Process::start_ready(Program::SimNode, &sandbox, &["run", "rope"]);
+    let file = sandbox.path("run.mcap");
+    let recorder = Program::Recorder.path().display().to_string();
+    // The reader ends with the first line that counts a snapshot.
+    let script = r#"set -o pipefail; "$0" record -o "$1" --progress | grep -qv '"snapshots":0,'"#;
+    let args = ["-c", script, &recorder, &file];
+    let ended = Process::start(Program::Bash, &sandbox, &args).wait();
+    assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+    let info = Process::run(Program::Recorder, &sandbox, &["info", &file, "--json"]).json();
+    assert_eq!(info["stop_reason"], "reader of the progress gone", "{info}");
 }
 
 #[test]

@@ -39,6 +39,7 @@ const FLUSH_INTERVALS: RangeInclusive<Duration> =
     recorder record -o run.mcap\n  \
     recorder record --name left --duration 10s --compression none\n  \
     recorder record -o run.mcap --steps 2400 --json\n  \
+    recorder record -o run.mcap --progress --json\n  \
     recorder record -o run.mcap --follow --wait\n  \
     recorder record -o run.mcap --split-size 1GB --max-files 10 --min-free 5GB\n  \
     recorder record -o incident.mcap --black-box 30s --max-files 10\n  \
@@ -100,6 +101,10 @@ pub(crate) struct RecordArgs {
     pub(super) extras: ExtraArgs,
     #[command(flatten)]
     pub(super) file: FileArgs,
+    /// Print a line of JSON four times a second, for a program that shows the progress: seconds, snapshots,
+    /// size and losses. The recording then also ends, cleanly, when the reader of the lines has gone
+    #[arg(long, conflicts_with = "black_box")]
+    pub(super) progress: bool,
     #[command(flatten)]
     pub(super) as_json: AsJson,
 }
@@ -141,6 +146,7 @@ impl From<SingleStateArgs> for RecordArgs {
             no_sync: false,
             extras: ExtraArgs::default(),
             file,
+            progress: false,
             as_json,
         }
     }

@@ -1,10 +1,14 @@
-//! The line on a terminal that shows a recording in progress.
+//! The progress of a recording: a line on a terminal, and lines of JSON for a program.
 
+use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::sync::Arc;
 
+use anyhow::Context;
 use recorder::{Closing, Topic};
+use serde::Serialize;
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
+use sim_contract::console;
 
 use super::feed::Feed;
 use super::queue::Queue;
@@ -17,11 +21,26 @@ const PERIOD_NS: u64 = SECOND_NS / 4;
 const SPEED_PERIOD_NS: u64 = 3 * SECOND_NS;
 const BYTES_PER_MB: f64 = 1e6;
 
+/// A line of JSON about a recording in progress.
+#[derive(Debug, PartialEq, Serialize)]
+struct Progress {
+    /// Time since the start, in s.
+    seconds: f64,
+    /// Number of snapshots in the newest file, of which some can wait in the queue.
+    snapshots: u64,
+    /// Size of the newest file so far, without its open chunk.
+    size_bytes: u64,
+    /// Number of missing messages of the newest file, for topics that have any, and "unreadable" ones.
+    lost: BTreeMap<&'static str, u64>,
+}
+
 /// Shows a line, and replaces it four times a second.
 #[derive(Debug)]
 pub(super) struct LiveLine {
     queue: Arc<Queue>,
     position: Arc<WritePosition>,
+    /// Also prints lines of JSON on stdout.
+    has_progress: bool,
     begin_ns: u64,
     next_ns: u64,
     last: Sample,
@@ -37,12 +56,13 @@ struct Sample {
 }
 
 impl LiveLine {
-    pub(super) fn new(queue: Arc<Queue>, position: Arc<WritePosition>) -> Self {
+    pub(super) fn new(queue: Arc<Queue>, position: Arc<WritePosition>, has_progress: bool) -> Self {
         let now_ns = monotonic_ns();
         let last = Sample { monotonic_ns: now_ns, ..Sample::default() };
         Self {
             queue,
             position,
+            has_progress,
             begin_ns: now_ns,
             next_ns: now_ns + PERIOD_NS,
             last,
@@ -50,11 +70,11 @@ impl LiveLine {
         }
     }
 
-    /// Replaces the line if it is time to.
-    pub(super) fn update(&mut self, feed: &Feed) {
+    /// Replaces the line if it is time to. Returns `false` if the reader of the lines of JSON has gone.
+    pub(super) fn update(&mut self, feed: &Feed) -> anyhow::Result<bool> {
         let now_ns = monotonic_ns();
         if now_ns < self.next_ns {
-            return;
+            return Ok(true);
         }
         self.next_ns = now_ns + PERIOD_NS;
         let (file_number, size_bytes) = self.position.get().unwrap_or_default();
@@ -66,10 +86,23 @@ impl LiveLine {
         let seconds = (now_ns - self.begin_ns) as f64 / SECOND_NS as f64;
         if feed.is_of_black_box() {
             output::show_live(black_box_text(seconds, size_bytes, file_number));
-            return;
+            return Ok(true);
         }
-        let line = text(seconds, &feed.closing(), self.bytes_per_s, self.queue.size_bytes());
-        output::show_live(line);
+        let closing = feed.closing();
+        output::show_live(text(seconds, &closing, self.bytes_per_s, self.queue.size_bytes()));
+        if !self.has_progress {
+            return Ok(true);
+        }
+        let progress = Progress::new(seconds, &closing, size_bytes);
+        let line = format!("{}\n", serde_json::to_string(&progress)?);
+        console::write_part(line.as_bytes()).context("cannot write to stdout")
+    }
+}
+
+impl Progress {
+    fn new(seconds: f64, closing: &Closing, size_bytes: u64) -> Self {
+        let snapshots = closing.counts[Topic::Steps].received;
+        Self { seconds, snapshots, size_bytes, lost: closing.missing() }
     }
 }
 
@@ -121,6 +154,18 @@ mod tests {
         closing.counts[Topic::Particles].gaps = 3;
         let line = text(1.04, &closing, 0.0, 0);
         assert!(line.ends_with("lost /particles 3 /steps 3"), "{line}");
+    }
+
+    #[test]
+    fn a_line_of_json_has_the_time_the_size_and_the_losses() {
+        let mut closing = Closing::default();
+        closing.counts[Topic::Steps].received = 240;
+        closing.counts[Topic::Particles].lost = 3;
+        let line = serde_json::to_string(&Progress::new(1.25, &closing, 4096)).unwrap();
+        assert_eq!(
+            line,
+            r#"{"seconds":1.25,"snapshots":240,"size_bytes":4096,"lost":{"/particles":3}}"#
+        );
     }
 
     #[test]

@@ -12,6 +12,8 @@ pub(crate) enum StopReason {
     /// The file has reached a limit, and the next one begins.
     Split,
     WriteError,
+    /// The reader of the progress has gone.
+    ReaderGone,
 }
 
 impl StopReason {
@@ -25,6 +27,7 @@ impl StopReason {
             Self::Run(RunEnd::EndStep) => "steps reached",
             Self::Split => "split",
             Self::WriteError => "write error",
+            Self::ReaderGone => "reader of the progress gone",
         }
     }
 
@@ -47,7 +50,8 @@ impl StopReason {
             | Self::Duration
             | Self::Run(RunEnd::EndStep)
             | Self::Split
-            | Self::WriteError => None,
+            | Self::WriteError
+            | Self::ReaderGone => None,
         }
     }
 }
