@@ -4,8 +4,9 @@ mod refusal;
 
 use std::ffi::OsString;
 use std::net::{IpAddr, SocketAddr};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
+use anyhow::Context;
 use clap::{CommandFactory, Parser};
 use sim_cli::DocumentVerb;
 use sim_contract::{Endpoint, EndpointError, NAME_DEFAULT};
@@ -32,6 +33,7 @@ use viewer_bridge::{FoxgloveOptions, FoxglovePermission, RecordingTimes, TokenDe
         viewer-bridge --replay run.mcap             show a recording; needs no node\n  \
         viewer-bridge --listen 0.0.0.0:8080         serve other machines; the address has a token\n  \
         viewer-bridge --token                       keep other users of this machine out\n  \
+        viewer-bridge --recordings runs             pages record into this folder\n  \
         viewer-bridge --foxglove                    also serve Foxglove viewers at ws://127.0.0.1:8765\n  \
         viewer-bridge --foxglove --allow-commands   let them pause, step, reset and set as well\n  \
         viewer-bridge --foxglove --replay run.mcap --play   show them a recording, again and again"
@@ -86,6 +88,10 @@ pub(crate) struct Args {
     /// absolute path
     #[arg(long = "scene", value_name = "FILE.toml", conflicts_with = "replay")]
     pub(crate) scenes: Vec<PathBuf>,
+    /// Folder for the recordings that pages start; it is created with the first one. Beyond loopback, pages
+    /// cannot record without this option [default: recordings, in the working directory]
+    #[arg(long, value_name = "DIR", conflicts_with = "replay")]
+    recordings: Option<PathBuf>,
     /// Name of the node: its services are NAME/particles, NAME/commands, ...
     #[arg(long, default_value = NAME_DEFAULT, value_name = "NAME", value_parser = Endpoint::parse_name)]
     name: String,
@@ -96,6 +102,32 @@ pub(crate) struct Args {
     /// Folder with the files of the page, for development [default: the built-in files]
     #[arg(long, value_name = "DIR")]
     pub(crate) assets: Option<PathBuf>,
+}
+
+/// Folder of the recordings without `--recordings`.
+const RECORDINGS_DEFAULT: &str = "recordings";
+
+/// The recordings that pages can start.
+#[derive(Debug)]
+pub(crate) struct RecordingPlan {
+    pub(crate) endpoint: Endpoint,
+    pub(crate) folder: RecordingFolder,
+}
+
+/// The folder for recordings.
+#[derive(Debug)]
+pub(crate) struct RecordingFolder {
+    path: PathBuf,
+    /// It was chosen on the command line.
+    is_given: bool,
+}
+
+impl RecordingFolder {
+    /// Returns the folder that pages may record into. Other machines write files only where somebody has
+    /// chosen the place.
+    pub(crate) fn folder(self, is_local: bool) -> Option<PathBuf> {
+        (is_local || self.is_given).then_some(self.path)
+    }
 }
 
 /// Reads the command line.
@@ -113,6 +145,21 @@ impl Args {
     /// The servers whose pages need a token.
     pub(crate) fn token_demand(&self) -> TokenDemand {
         if self.token { TokenDemand::Always } else { TokenDemand::BeyondLoopback }
+    }
+
+    /// The recordings that pages can start. A replay has none.
+    ///
+    /// # Errors
+    /// The endpoint is not valid, or the working directory is gone.
+    pub(crate) fn recording_plan(&self) -> anyhow::Result<Option<RecordingPlan>> {
+        if self.replay.is_some() {
+            return Ok(None);
+        }
+        let is_given = self.recordings.is_some();
+        let folder = self.recordings.as_deref().unwrap_or(Path::new(RECORDINGS_DEFAULT));
+        let path = std::path::absolute(folder).context("finding the folder of the recordings")?;
+        let folder = RecordingFolder { path, is_given };
+        Ok(Some(RecordingPlan { endpoint: self.endpoint()?, folder }))
     }
 
     /// Playback of the recording before the first request.

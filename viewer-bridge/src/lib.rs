@@ -33,6 +33,7 @@ pub use foxglove_server::{
     parse_published_command,
 };
 pub use pages::hub::Hub;
+pub use pages::recordings::Recordings;
 pub use pages::server::{Server, ServerOptions};
 pub use shutdown::Shutdown;
 pub use sink::Sinks;

@@ -5,11 +5,9 @@
 mod args;
 
 use std::future::poll_fn;
-use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::task::Poll;
-use std::thread::{self, JoinHandle};
 
 use anyhow::{Context, anyhow};
 use clap::CommandFactory;
@@ -17,16 +15,17 @@ use sim_contract::{Stop, console, report_bus_errors};
 use tokio::runtime;
 use tokio::signal::unix::{SignalKind, signal};
 use viewer_bridge::pages::assets::Assets;
-use viewer_bridge::request::{Requests, requests};
+use viewer_bridge::request::requests;
 use viewer_bridge::scene::catalog::Catalog;
 use viewer_bridge::source::live::Live;
 use viewer_bridge::source::replay::Replay;
+use viewer_bridge::source::thread::start_source;
 use viewer_bridge::{
-    FoxgloveOptions, FoxgloveServer, Hub, Server, ServerOptions, Shutdown, Sinks, Source,
-    open_files_warning,
+    FoxgloveOptions, FoxgloveServer, Hub, Recordings, Server, ServerOptions, Shutdown, Sinks,
+    Source, open_files_warning,
 };
 
-use args::Args;
+use args::{Args, RecordingPlan};
 
 /// Threads of the servers. They only send; the thread of the source encodes.
 const SERVER_THREADS: usize = 2;
@@ -77,7 +76,8 @@ fn run(args: &Args) -> anyhow::Result<()> {
         .enable_all()
         .build()
         .context("starting the threads of the servers")?;
-    runtime.block_on(serve(source, options, foxglove, stop))
+    let recording = args.recording_plan()?;
+    runtime.block_on(serve(source, Servers { pages: options, foxglove, recording }, stop))
 }
 
 fn open_source(args: &Args, stop: &Stop) -> anyhow::Result<Box<dyn Source>> {
@@ -89,20 +89,28 @@ fn open_source(args: &Args, stop: &Stop) -> anyhow::Result<Box<dyn Source>> {
     Ok(Box::new(Live::new(args.endpoint()?, catalog)))
 }
 
-/// Serves until a signal arrives or the source ends.
-async fn serve(
-    source: Box<dyn Source>,
-    options: ServerOptions,
+/// The servers, and the recordings of their pages.
+struct Servers {
+    pages: ServerOptions,
     foxglove: Option<FoxgloveOptions>,
-    stop: Stop,
-) -> anyhow::Result<()> {
+    /// The recordings that pages can start, if the source is live.
+    recording: Option<RecordingPlan>,
+}
+
+/// Serves until a signal arrives or the source ends.
+async fn serve(source: Box<dyn Source>, servers: Servers, stop: Stop) -> anyhow::Result<()> {
     let stop_signal = stop_signal(&stop)?;
-    let server = Server::bind(options).await?;
+    let Servers { pages, foxglove, recording } = servers;
+    let server = Server::bind(pages).await?;
     let (sender, requests) = requests();
     let shutdown = Shutdown::default();
     let hub = Arc::new(Hub::new(source.mode(), source.scenes(), sender.clone()));
     let mut sinks = Sinks::new(shutdown.clone());
     sinks.add(Arc::<Hub>::clone(&hub));
+    let recordings = recording.map(|RecordingPlan { endpoint, folder }| {
+        let folder = folder.folder(server.is_local());
+        Arc::new(Recordings::new(Arc::clone(&hub), endpoint, folder, stop))
+    });
     let foxglove = match foxglove {
         None => None,
         Some(options) => {
@@ -125,7 +133,11 @@ async fn serve(
         }
         shutdown.begin();
     };
-    tokio::join!(server.serve(hub, shutdown.clone()), serve_foxglove, wait_for_end);
+    let serve_pages = server.serve(hub, recordings.clone(), shutdown.clone());
+    tokio::join!(serve_pages, serve_foxglove, wait_for_end);
+    if let Some(recordings) = recordings {
+        recordings.finish();
+    }
     source_thread.join().map_err(|_| anyhow!("the thread of the source panicked"))?
 }
 
@@ -146,23 +158,6 @@ fn stop_signal(stop: &Stop) -> anyhow::Result<impl Future<Output = ()> + use<>> 
             .await;
         }
     })
-}
-
-/// Starts the thread of the source. However the source ends, the shutdown begins.
-fn start_source(
-    mut source: Box<dyn Source>,
-    sinks: Sinks,
-    requests: Requests,
-    shutdown: Shutdown,
-) -> anyhow::Result<JoinHandle<anyhow::Result<()>>> {
-    thread::Builder::new()
-        .name("source".to_owned())
-        .spawn(move || {
-            let result = catch_unwind(AssertUnwindSafe(|| source.run(&sinks, &requests)));
-            shutdown.begin();
-            result.unwrap_or_else(|panic| resume_unwind(panic))
-        })
-        .context("starting the thread of the source")
 }
 
 /// Prints the addresses.

@@ -2,12 +2,14 @@
 
 mod check;
 mod from_page;
+mod recording;
 mod refusal;
 mod timeline;
 mod to_page;
 
 pub use check::check;
 pub use from_page::{Choice, Command, FromPage, Hello, Malformed, Wish};
+pub use recording::{RecordingState, RecordingText};
 pub use refusal::Refusal;
 pub use timeline::{Hashes, HistoryText, Mark, MarkKind, Playback, Timeline, Toward};
 pub use to_page::{

@@ -6,5 +6,7 @@ mod frame_encoder;
 mod frame_set;
 mod history;
 pub mod hub;
+pub mod recordings;
+mod replays;
 pub mod server;
 mod session;

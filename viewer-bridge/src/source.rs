@@ -5,5 +5,6 @@ pub mod live;
 pub mod recording_times;
 pub mod replay;
 pub mod shown_state;
+pub mod thread;
 
 pub use feed::Source;

@@ -6,6 +6,7 @@
 #[allow(dead_code, reason = "its other half is used by the tests that have no node")]
 mod foxglove_client;
 mod page;
+mod recording;
 mod replay;
 mod vanished;
 

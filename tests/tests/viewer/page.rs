@@ -45,14 +45,44 @@ impl Bridge {
 
     /// Opens a page that receives unquantised positions.
     pub(crate) fn page(&self) -> Page {
-        let stream = TcpStream::connect(&self.host).unwrap();
-        stream.set_read_timeout(Some(DEADLINE)).unwrap();
-        let url = format!("ws://{}/socket", self.host);
-        let (socket, _) = tungstenite::client(url, stream).unwrap();
-        let mut page = Page { socket, hello: Value::Null, texts: VecDeque::new(), last_id: 0 };
-        page.send(&json!({ "type": "hello", "protocol": 2, "format": "f32" }));
+        self.page_at("/socket")
+    }
+
+    /// Opens the page of a socket.
+    pub(crate) fn page_at(&self, path: &str) -> Page {
+        let mut page = self.greet(path, &json!({}));
         page.hello = page.text(|text| text["type"] == "hello");
         assert_eq!(page.hello["protocol"], 2);
+        page
+    }
+
+    /// Opens the page of a socket of a bridge that demands a token.
+    pub(crate) fn page_with_token(&self, path: &str, token: &str) -> Page {
+        let mut page = self.greet(path, &json!({ "token": token }));
+        page.hello = page.text(|text| text["type"] == "hello");
+        page
+    }
+
+    /// Sends `hello`, with further fields, to a server that refuses it. Returns the close code and the
+    /// reason.
+    pub(crate) fn refusal_at(&self, path: &str, fields: &Value) -> (u16, String) {
+        let mut page = self.greet(path, fields);
+        loop {
+            if let Message::Close(Some(frame)) = page.socket.read().unwrap() {
+                return (frame.code.into(), frame.reason.to_string());
+            }
+        }
+    }
+
+    fn greet(&self, path: &str, fields: &Value) -> Page {
+        let host = self.host.split('/').next().unwrap();
+        let stream = TcpStream::connect(host).unwrap();
+        stream.set_read_timeout(Some(DEADLINE)).unwrap();
+        let (socket, _) = tungstenite::client(format!("ws://{host}{path}"), stream).unwrap();
+        let mut page = Page { socket, hello: Value::Null, texts: VecDeque::new(), last_id: 0 };
+        let mut hello = json!({ "type": "hello", "protocol": 2, "format": "f32" });
+        hello.as_object_mut().unwrap().extend(fields.as_object().unwrap().clone());
+        page.send(&hello);
         page
     }
 }

@@ -73,6 +73,8 @@ pub fn check(command: &Command) -> Result<(), Reason> {
         | Command::Look { .. }
         | Command::Rewind { .. }
         | Command::Undo { .. }
+        | Command::Record {}
+        | Command::StopRecording {}
         | Command::Seek { .. }
         | Command::Loop { .. } => Ok(()),
     }

@@ -178,6 +178,8 @@ pub enum Command {
         #[serde(default)]
         takes_others: bool,
     },
+    Record {},
+    StopRecording {},
     Seek {
         step: u64,
     },
@@ -227,6 +229,8 @@ impl Command {
             Self::Rewind { .. } => "rewind",
             Self::Undo { .. } => "undo",
             Self::Set { .. } => "set",
+            Self::Record {} => "record",
+            Self::StopRecording {} => "stop_recording",
             Self::Seek { .. } => "seek",
             Self::Rate { .. } => "rate",
             Self::Loop { .. } => "loop",

@@ -42,6 +42,12 @@ pub enum Refusal {
     SceneNotKnown,
     /// The scene of the state has another content now.
     SceneChanged,
+    /// The bridge has no folder for recordings.
+    RecordingNotAllowed,
+    /// A recording is being made.
+    AlreadyRecording,
+    /// No recording is being made.
+    NotRecording,
 }
 
 impl From<Reason> for Refusal {
@@ -82,6 +88,9 @@ impl Refusal {
             Self::StateNotKept => "state_not_kept",
             Self::SceneNotKnown => "scene_not_known",
             Self::SceneChanged => "scene_changed",
+            Self::RecordingNotAllowed => "recording_not_allowed",
+            Self::AlreadyRecording => "already_recording",
+            Self::NotRecording => "not_recording",
         }
     }
 
@@ -127,6 +136,12 @@ impl Refusal {
             Self::SceneChanged => {
                 "the file of the scene has changed since, so the state before it does not fit"
             }
+            Self::RecordingNotAllowed => {
+                "other machines can reach this viewer, so it records only into a folder that it was \
+                 given: start it with `viewer-bridge --recordings DIR`"
+            }
+            Self::AlreadyRecording => "a recording is being made already; stop it first",
+            Self::NotRecording => "no recording is being made",
         };
         text.into()
     }

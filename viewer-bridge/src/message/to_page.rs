@@ -4,6 +4,7 @@ use serde::{Serialize, Serializer};
 use sim_contract::ParameterValues;
 
 use super::from_page::Choice;
+use super::recording::RecordingText;
 use super::refusal::Refusal;
 use super::timeline::{HistoryText, Playback, Timeline};
 use crate::limits;
@@ -44,6 +45,8 @@ pub enum ToPage {
     Playback(Playback),
     /// The past of a live simulation.
     History(HistoryText),
+    /// The recording that the bridge makes.
+    Recording(RecordingText),
     /// The newest change of the page that it can undo.
     Undoable {
         /// Kind of change.

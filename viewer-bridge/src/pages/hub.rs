@@ -19,7 +19,9 @@ pub use super::frame_set::Formats;
 use super::frame_set::{FrameSet, format_for};
 use super::history::{History, PastMessages, Viewer};
 use crate::limits::{PROTOCOL, RELIABLE_QUEUED_MAX};
-use crate::message::{Choice, Level, Mode, PageLimits, Refusal, ToPage, Toward, Welcome};
+use crate::message::{
+    Choice, Level, Mode, Node, PageLimits, RecordingText, Refusal, ToPage, Toward, Welcome,
+};
 use crate::request::{ClientId, RequestKind, RequestSender};
 use crate::scene::catalog::SceneEntry;
 use crate::sink::{Demand, Sink, State, Torn, Update};
@@ -33,6 +35,7 @@ enum Slot {
     Parameters,
     Timeline,
     Playback,
+    Recording,
     /// A new scene empties the slots after this one.
     Scene,
     Tear,
@@ -59,6 +62,8 @@ pub struct Hub {
 struct HubState {
     latched: BTreeMap<Slot, Message>,
     pages: BTreeMap<ClientId, Page>,
+    /// The newest state of the node.
+    node: Node,
     last_number: u32,
 }
 
@@ -184,6 +189,16 @@ impl Hub {
             lock(&self.history).keep(stamp, &frame);
         }
         self.frames.send_replace(frame);
+    }
+
+    /// The newest state of the node.
+    pub(super) fn node(&self) -> Node {
+        lock(&self.state).node.clone()
+    }
+
+    /// Shows the recording that the bridge makes.
+    pub(super) fn publish_recording(&self, recording: &RecordingText) {
+        self.latch(Slot::Recording, &ToPage::Recording(recording.clone()));
     }
 
     fn publish_history(&self) {
@@ -328,7 +343,10 @@ impl Sink for Hub {
                 self.publish_history();
                 self.publish_statistics(statistics);
             }
-            Update::Node(node) => self.latch(Slot::Node, &ToPage::Node(node.clone())),
+            Update::Node(node) => {
+                lock(&self.state).node = node.clone();
+                self.latch(Slot::Node, &ToPage::Node(node.clone()));
+            }
             Update::Parameters(parameters) => {
                 self.latch(Slot::Parameters, &ToPage::Parameters(Box::new(parameters.clone())));
             }

@@ -14,6 +14,8 @@ use thiserror::Error;
 
 use super::assets::Assets;
 use super::hub::Hub;
+use super::recordings::Recordings;
+use super::replays::Replays;
 use super::session::{self, Sessions};
 use crate::shutdown::Shutdown;
 use crate::socket::guard::{Guard, TokenDemand, guarded};
@@ -91,15 +93,30 @@ impl Server {
         self.guard.is_local()
     }
 
-    /// Serves until the shutdown begins and every page has been informed.
-    pub async fn serve(self, hub: Arc<Hub>, shutdown: Shutdown) {
+    /// Serves until the shutdown begins and every page has been informed. Pages can start and open
+    /// `recordings`, if there are any.
+    pub async fn serve(
+        self,
+        hub: Arc<Hub>,
+        recordings: Option<Arc<Recordings>>,
+        shutdown: Shutdown,
+    ) {
         let pages = client_permits();
-        let (guard, shutdown_of_pages) = (Arc::clone(&self.guard), shutdown.clone());
-        let sessions =
-            Sessions { hub, guard, shutdown: shutdown_of_pages, pages: Arc::clone(&pages) };
-        let state = ServerState { sessions, assets: self.assets };
-        let router = guarded(router(Arc::new(state)), self.guard);
+        let replays = recordings.as_ref().map_or_else(Replays::default, |recordings| {
+            Replays::new(recordings.folder(), recordings.stop_signals().clone())
+        });
+        let sessions = Sessions {
+            hub,
+            recordings,
+            replays,
+            guard: Arc::clone(&self.guard),
+            shutdown: shutdown.clone(),
+            pages: Arc::clone(&pages),
+        };
+        let state = Arc::new(ServerState { sessions, assets: self.assets });
+        let router = guarded(router(Arc::clone(&state)), self.guard);
         self.listener.serve(router, pages, &shutdown).await;
+        state.sessions.replays.end().await;
     }
 }
 
@@ -107,6 +124,10 @@ fn router(state: Arc<ServerState>) -> Router {
     Router::new()
         .route("/", get(page))
         .route("/socket", get(socket))
+        // The page of a recording, at an address of its own: its files and its socket lie below that.
+        .route("/replay/{name}/", get(page))
+        .route("/replay/{name}/socket", get(replay_socket))
+        .route("/replay/{name}/{*path}", get(replay_file))
         .route("/{*path}", get(file))
         .with_state(state)
 }
@@ -123,11 +144,30 @@ async fn file(
     state.assets.answer(&path, &headers)
 }
 
+async fn replay_file(
+    State(state): State<Arc<ServerState>>,
+    Path((_name, path)): Path<(String, String)>,
+    headers: HeaderMap,
+) -> Response {
+    state.assets.answer(&path, &headers)
+}
+
 async fn socket(
     State(state): State<Arc<ServerState>>,
     Extension(place): Extension<Arc<Place>>,
     upgrade: WebSocketUpgrade,
 ) -> Response {
     limit(upgrade)
-        .on_upgrade(async move |socket| session::serve(socket, &state.sessions, place).await)
+        .on_upgrade(async move |socket| session::serve(socket, &state.sessions, place, None).await)
+}
+
+async fn replay_socket(
+    State(state): State<Arc<ServerState>>,
+    Extension(place): Extension<Arc<Place>>,
+    Path(name): Path<String>,
+    upgrade: WebSocketUpgrade,
+) -> Response {
+    limit(upgrade).on_upgrade(async move |socket| {
+        session::serve(socket, &state.sessions, place, Some(&name)).await;
+    })
 }

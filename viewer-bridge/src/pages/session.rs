@@ -10,6 +10,8 @@ use tokio::time::timeout;
 use super::connection::{Acknowledged, Connection, NextFrame};
 use super::history::PastMessages;
 use super::hub::Hub;
+use super::recordings::Recordings;
+use super::replays::Replays;
 use crate::limits::{HELLO_TIMEOUT, PROTOCOL};
 use crate::message::{Command, FromPage, Hello, OutcomeText, Refusal, ToPage, Wish, check};
 use crate::request::{ClientId, RequestKind};
@@ -22,6 +24,8 @@ use crate::socket::peer::{End, FULL, GOING_AWAY, Peer, TOO_SLOW};
 const MALFORMED: u16 = 4400;
 /// The token is missing or wrong.
 const NO_TOKEN: u16 = 4401;
+/// There is no such recording.
+const NO_RECORDING: u16 = 4404;
 /// The page speaks another version of the protocol.
 const OTHER_PROTOCOL: u16 = 4426;
 
@@ -29,20 +33,54 @@ const OTHER_PROTOCOL: u16 = 4426;
 #[derive(Debug)]
 pub(super) struct Sessions {
     pub(super) hub: Arc<Hub>,
+    /// Those that pages can start, if the source is live.
+    pub(super) recordings: Option<Arc<Recordings>>,
+    /// Those that pages have opened.
+    pub(super) replays: Replays,
     pub(super) guard: Arc<Guard>,
     pub(super) shutdown: Shutdown,
     /// A permit for each page.
     pub(super) pages: Arc<Semaphore>,
 }
 
+/// The source that a page shows.
+struct Venue {
+    hub: Arc<Hub>,
+    /// Those that its pages can start.
+    recordings: Option<Arc<Recordings>>,
+    shutdown: Shutdown,
+}
+
+impl Sessions {
+    /// Returns the source of the bridge, or opens a recording.
+    async fn venue(&self, recording: Option<&str>) -> Result<Venue, End> {
+        let Some(name) = recording else {
+            let (hub, recordings) = (Arc::clone(&self.hub), self.recordings.clone());
+            return Ok(Venue { hub, recordings, shutdown: self.shutdown.clone() });
+        };
+        let opened = self.replays.open(name).await;
+        let (hub, shutdown) = opened.map_err(|reason| End::closed(NO_RECORDING, reason))?;
+        Ok(Venue { hub, recordings: None, shutdown })
+    }
+}
+
 /// Serves a page until it leaves or breaks the rules. A page counts against the limit once it has sent
-/// a valid token; until then it only holds its place in the lobby.
-pub(super) async fn serve(socket: WebSocket, sessions: &Sessions, place: Arc<Place>) {
+/// a valid token; until then it only holds its place in the lobby. Only then is its recording opened, if
+/// it is the page of one.
+pub(super) async fn serve(
+    socket: WebSocket,
+    sessions: &Sessions,
+    place: Arc<Place>,
+    recording: Option<&str>,
+) {
     let mut peer = Peer::new(socket);
     let end = match place.while_held(greet(&mut peer, sessions)).await {
         Some(Ok(Greeting { hello, _permit })) => {
             drop(place);
-            return serve_page(peer, sessions, &hello).await;
+            return match sessions.venue(recording).await {
+                Ok(venue) => serve_page(peer, sessions, &venue, &hello).await,
+                Err(end) => peer.close(end).await,
+            };
         }
         Some(Err(end)) => end,
         None => End::evicted(),
@@ -66,10 +104,13 @@ async fn greet<'a>(peer: &mut Peer, sessions: &'a Sessions) -> Result<Greeting<'
     Ok(Greeting { hello, _permit: permit })
 }
 
-async fn serve_page(mut peer: Peer, sessions: &Sessions, hello: &Hello) {
-    let connection = sessions.hub.join(hello.format);
-    let membership = Membership { hub: &sessions.hub, client: connection.client };
-    let end = converse(&mut peer, sessions, connection).await;
+async fn serve_page(mut peer: Peer, sessions: &Sessions, venue: &Venue, hello: &Hello) {
+    let connection = venue.hub.join(hello.format);
+    let membership = Membership { hub: &venue.hub, client: connection.client };
+    let end = tokio::select! {
+        end = converse(&mut peer, venue, connection) => end,
+        () = sessions.shutdown.begun() => End::closed(GOING_AWAY, "the server shuts down"),
+    };
     // The grabs of the page end at once, however slowly it closes.
     drop(membership);
     peer.close(end).await;
@@ -114,8 +155,8 @@ fn parse(message: &Message) -> Result<FromPage, End> {
 }
 
 /// Talks with a page that has joined, until the end.
-async fn converse(peer: &mut Peer, sessions: &Sessions, mut connection: Connection) -> End {
-    let hub = &sessions.hub;
+async fn converse(peer: &mut Peer, venue: &Venue, mut connection: Connection) -> End {
+    let hub = &venue.hub;
     loop {
         let has_credit = connection.credit.is_left();
         let result = tokio::select! {
@@ -125,14 +166,14 @@ async fn converse(peer: &mut Peer, sessions: &Sessions, mut connection: Connecti
                 None => Err(End::closed(TOO_SLOW, "too many messages were left unread")),
             },
             message = peer.receive() => match message {
-                Ok(message) => accept(&message, peer, hub, &mut connection).await,
+                Ok(message) => accept(&message, peer, venue, &mut connection).await,
                 Err(end) => Err(end),
             },
             changed = connection.frames.changed(), if has_credit => match changed {
                 Ok(()) => send_frame(peer, hub, &mut connection).await,
                 Err(_) => Err(End::closed(GOING_AWAY, "the server shuts down")),
             },
-            () = sessions.shutdown.begun() => Err(End::closed(GOING_AWAY, "the server shuts down")),
+            () = venue.shutdown.begun() => Err(End::closed(GOING_AWAY, "the server shuts down")),
         };
         if let Err(end) = result {
             return end;
@@ -194,9 +235,10 @@ async fn show_past(
 async fn accept(
     message: &Message,
     peer: &mut Peer,
-    hub: &Hub,
+    venue: &Venue,
     connection: &mut Connection,
 ) -> Result<(), End> {
+    let hub = &*venue.hub;
     match parse(message)? {
         FromPage::Ack { frame } => {
             if connection.acknowledge(frame) == Acknowledged::CreditRestored {
@@ -216,10 +258,34 @@ async fn accept(
             let sought = hub.look(connection, step, toward);
             return show_past(peer, connection, id, sought).await;
         }
+        FromPage::Command {
+            id,
+            command: command @ (Command::Record {} | Command::StopRecording {}),
+        } => {
+            control_recording(venue, connection.client, id, &command);
+        }
         FromPage::Command { id, command } => submit(hub, connection.client, id, command),
         FromPage::Hello(_) => return Err(End::closed(MALFORMED, "hello was sent twice")),
     }
     Ok(())
+}
+
+/// Starts or stops a recording, and answers at once: the state of the recording follows as messages of
+/// their own.
+fn control_recording(venue: &Venue, client: ClientId, id: Option<u32>, command: &Command) {
+    let kind = command.name();
+    let result = match &venue.recordings {
+        None => Err(Refusal::OnlyLive),
+        Some(recordings) if matches!(command, Command::Record {}) => recordings.start(),
+        Some(recordings) => recordings.stop(),
+    };
+    let answer = match result {
+        Ok(()) => OutcomeText { applied: 1, ..OutcomeText::pending(id, kind) },
+        Err(reason) => OutcomeText::refused(id, kind, reason),
+    };
+    if id.is_some() || result.is_err() {
+        venue.hub.send(client, &ToPage::Outcome(answer));
+    }
 }
 
 /// Checks a command and sends it to the source. Answers it here if it is refused.

@@ -4,8 +4,8 @@ use serde_json::{Value, json};
 use sim_contract::{ParameterValues, Reason};
 use viewer_bridge::message::{
     Choice, FromPage, Hashes, HistoryText, Level, Mark, MarkKind, Mode, Node, NodeState,
-    OutcomeText, PageLimits, ParametersText, Playback, Refusal, Status, Timeline, ToPage, Undoable,
-    Welcome,
+    OutcomeText, PageLimits, ParametersText, Playback, RecordingState, RecordingText, Refusal,
+    Status, Timeline, ToPage, Undoable, Welcome,
 };
 use viewer_bridge::scene::catalog::Catalog;
 
@@ -76,6 +76,21 @@ fn to_page() -> Vec<ToPage> {
     ]
 }
 
+fn to_page_of_a_recording() -> [ToPage; 2] {
+    let idle = RecordingText { state: RecordingState::Idle, ..RecordingText::default() };
+    let finished = RecordingText {
+        state: RecordingState::Finished,
+        text: "the recording ended because another scene was loaded".to_owned(),
+        name: Some("curtain_2026-11-25T09-12-03Z".to_owned()),
+        path: Some("/home/ada/recordings/curtain_2026-11-25T09-12-03Z.mcap".to_owned()),
+        seconds: 12.25,
+        snapshots: 2937,
+        size_bytes: 8_123_456,
+        lost: [("/particles".to_owned(), 3), ("/steps".to_owned(), 3)].into(),
+    };
+    [idle, finished].map(ToPage::Recording)
+}
+
 fn to_page_of_a_replay() -> Vec<ToPage> {
     vec![
         ToPage::Timeline(Box::new(Timeline {
@@ -103,7 +118,7 @@ fn to_page_of_a_replay() -> Vec<ToPage> {
 }
 
 /// One message of each kind that a page may send.
-const FROM_PAGE: [&str; 33] = [
+const FROM_PAGE: [&str; 35] = [
     r#"{"type":"hello","protocol":2,"token":"00","format":"u16"}"#,
     r#"{"type":"hello","protocol":2}"#,
     r#"{"type":"ack","frame":77}"#,
@@ -134,6 +149,8 @@ const FROM_PAGE: [&str; 33] = [
     r#"{"type":"rewind","to_step":1200}"#,
     r#"{"type":"undo"}"#,
     r#"{"type":"undo","takes_others":true,"id":3}"#,
+    r#"{"type":"record","id":4}"#,
+    r#"{"type":"stop_recording"}"#,
     r#"{"type":"seek","step":1200}"#,
     r#"{"type":"rate","value":0.5}"#,
     r#"{"type":"loop","is_on":true}"#,
@@ -147,6 +164,7 @@ fn the_texts_are_frozen() {
     let parse = |text: &str| serde_json::from_str::<Value>(text).unwrap();
     let to_page: Vec<_> = to_page()
         .into_iter()
+        .chain(to_page_of_a_recording())
         .chain(to_page_of_a_replay())
         .map(|message| parse(&message.to_json()))
         .collect();

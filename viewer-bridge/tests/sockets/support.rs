@@ -76,7 +76,7 @@ impl Site {
         sinks.add(Arc::<Hub>::clone(&hub));
         let port = url.rsplit(':').next().unwrap().split('/').next().unwrap();
         let address = SocketAddr::from(([127, 0, 0, 1], port.parse().unwrap()));
-        runtime.spawn(server.serve(Arc::clone(&hub), shutdown.clone()));
+        runtime.spawn(server.serve(Arc::clone(&hub), None, shutdown.clone()));
         let shown = ShownState::default();
         Self { hub, sinks, shutdown, requests, address, url, shown, _runtime: runtime }
     }

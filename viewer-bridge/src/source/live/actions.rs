@@ -69,8 +69,11 @@ pub(super) fn actions(
             constraint_kind: None,
         },
         Command::Seek { .. } | Command::Loop { .. } => return Err(Refusal::OnlyReplay),
-        // The hub answers the one, and the link the other.
-        Command::Look { .. } | Command::Undo { .. } => return Err(Refusal::OnlyLive),
+        // The server of the pages and the link answer them.
+        Command::Look { .. }
+        | Command::Undo { .. }
+        | Command::Record {}
+        | Command::StopRecording {} => return Err(Refusal::OnlyLive),
     };
     Ok(vec![action])
 }

@@ -1,0 +1,89 @@
+//! Names of recordings. A page never chooses a file: the bridge names what it writes, and opens only a
+//! name without any path in its own folder.
+
+use std::path::{Path, PathBuf};
+use std::time::{Duration, UNIX_EPOCH};
+
+use sim_contract::part_path;
+
+/// Longest part of a name that comes from the scene.
+const SCENE_LENGTH_MAX: usize = 48;
+/// Longest name that is opened.
+const NAME_LENGTH_MAX: usize = 128;
+/// Ending of the files.
+const ENDING: &str = "mcap";
+
+fn is_plain(letter: char) -> bool {
+    letter.is_ascii_alphanumeric() || letter == '-' || letter == '_'
+}
+
+/// Returns a path in the folder that no recording has: the scene and the time in UTC, and a number if
+/// that is taken.
+pub(super) fn free_path(folder: &Path, scene: &str, now_ns: u64) -> PathBuf {
+    let scene: String = scene.chars().take(SCENE_LENGTH_MAX).collect();
+    let scene = scene.replace(|letter| !is_plain(letter), "-");
+    let scene = if scene.is_empty() { "recording" } else { &scene };
+    let now = UNIX_EPOCH + Duration::from_nanos(now_ns);
+    let time = humantime::format_rfc3339_seconds(now).to_string().replace(':', "-");
+    let mut path = folder.join(format!("{scene}_{time}.{ENDING}"));
+    let mut number = 1_u32;
+    while path.exists() || part_path(&path).exists() {
+        number += 1;
+        path.set_file_name(format!("{scene}_{time}_{number}.{ENDING}"));
+    }
+    path
+}
+
+/// Returns the name under which a page opens a recording.
+pub(super) fn name_of(path: &Path) -> Option<String> {
+    path.file_stem().and_then(|stem| stem.to_str()).map(str::to_owned)
+}
+
+/// Returns the file of a name in the folder; `None` if it is not a plain name.
+pub(in crate::pages) fn path_of(folder: &Path, name: &str) -> Option<PathBuf> {
+    let is_name = !name.is_empty() && name.len() <= NAME_LENGTH_MAX && name.chars().all(is_plain);
+    is_name.then(|| folder.join(format!("{name}.{ENDING}")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NOON_NS: u64 = 1_764_072_000_000_000_000;
+
+    #[test]
+    fn a_recording_is_named_by_its_scene_and_time_and_never_leaves_the_folder() {
+        let folder = Path::new("/nowhere");
+        let name = |scene: &str| free_path(folder, scene, NOON_NS).display().to_string();
+        assert_eq!(name("curtain"), "/nowhere/curtain_2025-11-25T12-00-00Z.mcap");
+        assert_eq!(name(""), "/nowhere/recording_2025-11-25T12-00-00Z.mcap");
+        assert_eq!(name("../../a b"), "/nowhere/------a-b_2025-11-25T12-00-00Z.mcap");
+        assert!(name(&"x".repeat(500)).len() < 100);
+        let path = free_path(folder, "rope", NOON_NS);
+        assert_eq!(path_of(folder, &name_of(&path).unwrap()), Some(path));
+    }
+
+    #[test]
+    fn a_name_that_is_taken_gets_a_number() {
+        let folder = std::env::temp_dir().join(format!("catenary-names-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let first = free_path(&folder, "rope", NOON_NS);
+        std::fs::write(part_path(&first), "").unwrap();
+        let second = free_path(&folder, "rope", NOON_NS);
+        std::fs::write(&second, "").unwrap();
+        let third = free_path(&folder, "rope", NOON_NS);
+        std::fs::remove_dir_all(&folder).unwrap();
+        assert!(second.ends_with("rope_2025-11-25T12-00-00Z_2.mcap"), "{second:?}");
+        assert!(third.ends_with("rope_2025-11-25T12-00-00Z_3.mcap"), "{third:?}");
+    }
+
+    #[test]
+    fn only_plain_names_are_opened() {
+        let folder = Path::new("/nowhere");
+        for name in
+            ["", ".", "..", "../a", "a/b", "a.mcap", "a\\b", "a b", "\u{0}", "é", &"x".repeat(129)]
+        {
+            assert_eq!(path_of(folder, name), None, "{name:?}");
+        }
+    }
+}
