@@ -21,6 +21,11 @@ mod replay;
 mod support;
 mod time;
 
+/// Recordings that the page makes.
+mod save {
+    mod recording;
+}
+
 /// Looks back, and changes that are undone.
 mod past {
     mod history;

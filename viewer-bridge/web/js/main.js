@@ -15,6 +15,7 @@ import { Hint, Question } from "./ui/prompts.js";
 import { parseLink } from "./ui/link.js";
 import { Overlay } from "./ui/overlay.js";
 import { Inspector } from "./panel/inspector.js";
+import { RecordingControl } from "./save/recording.js";
 import { Panel } from "./panel/panel.js";
 import { Connector } from "./net/socket.js";
 import { Selection } from "./state/selection.js";
@@ -66,10 +67,17 @@ function loadToken() {
   return link.token ?? sessionStorage.getItem(TOKEN_KEY);
 }
 
+/** Address of the socket: it lies beside the page, whose address that of a recording can be. */
+function socketAddress() {
+  const address = new URL("socket", location.href);
+  address.protocol = location.protocol === "https:" ? "wss:" : "ws:";
+  return address.href;
+}
+
 /** @param {Renderer} renderer */
 function start(renderer) {
-  const url = `${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/socket`;
-  const connector = new Connector(url, loadToken(), {
+  const token = loadToken();
+  const connector = new Connector(socketAddress(), token, {
     onBinary: (message) => simulation.receive(message),
     onText: (message) => simulation.receiveText(message),
     onChange: (connection) => {
@@ -107,6 +115,7 @@ function start(renderer) {
   const forceLegend = new ForceLegend(app);
   const colorLegend = new ColorLegend(app);
   colorLegend.choose(link.colour);
+  new RecordingControl(app, token);
   const wishes = new Wishes(simulation, commands, {
     forces: () => renderer.toggles.forces || inspector.wantsForces(),
     speeds: () => renderer.toggles.heat && renderer.coloring.quantity === "speed",

@@ -47,7 +47,9 @@ impl Rig {
     fn within(sandbox: Sandbox, args: &[&str], fragment: &str) -> Self {
         let browser = Rc::new(BrowserLock::acquire());
         let node = start_node(&sandbox, args);
-        let (bridge, url) = start_bridge(&sandbox, &["--listen", ANY_PORT]);
+        let recordings = sandbox.path("recordings");
+        let bridge = ["--listen", ANY_PORT, "--recordings", &recordings];
+        let (bridge, url) = start_bridge(&sandbox, &bridge);
         let tab = Tab::open(&browser, &address(&url, fragment));
         let client = Client::attach(&sandbox.endpoint()).unwrap();
         Self { tab, client, state: State::default(), bridge, node, sandbox, url, browser }
@@ -56,6 +58,11 @@ impl Rig {
     /// Opens another page of the bridge.
     pub(crate) fn another_tab(&self, fragment: &str) -> Tab {
         Tab::open(&self.browser, &address(&self.url, fragment))
+    }
+
+    /// Opens another page of the bridge, at a path.
+    pub(crate) fn tab_at(&self, path: &str) -> Tab {
+        Tab::open(&self.browser, &address(&format!("{}{path}", self.url), ""))
     }
 
     /// Returns the newest state of the node.

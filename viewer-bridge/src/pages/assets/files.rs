@@ -46,6 +46,8 @@ pub(super) const FILES: &[(&str, &[u8])] = files![
     "js/panel/selection-plots.js",
     "js/panel/series.js",
     "js/panel/value-field.js",
+    "js/save/recording-text.js",
+    "js/save/recording.js",
     "js/state/emitter.js",
     "js/state/forces.js",
     "js/state/framing.js",

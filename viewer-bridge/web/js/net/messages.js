@@ -22,9 +22,13 @@
  * }} TimelineMessage
  * @typedef {{ type: "playback", is_playing: boolean, rate: number, is_looping: boolean, step: number, time_s: number }} Playback
  * @typedef {{ type: "history", first_step: number | null, marks: Mark[], text: string }} HistoryMessage
+ * @typedef {{
+ *   type: "recording", state: "unavailable" | "idle" | "recording" | "finishing" | "finished" | "failed", text: string, name: string | null,
+ *   path: string | null, seconds: number, snapshots: number, size_bytes: number, lost: Record<string, number>,
+ * }} RecordingMessage
  * @typedef {"cut" | "reset" | "load" | "rewind"} Undoable
  * @typedef {{ type: "undoable", what: Undoable | null }} UndoableMessage
- * @typedef {Hello | NodeState | Parameters | OutcomeMessage | TimelineMessage | Playback | HistoryMessage | UndoableMessage | { type: "clients", count: number }
+ * @typedef {Hello | NodeState | Parameters | OutcomeMessage | TimelineMessage | Playback | HistoryMessage | UndoableMessage | RecordingMessage | { type: "clients", count: number }
  *   | { type: "reset", step: number } | { type: "notice", level: string, text: string }} TextMessage
  */
 

@@ -18,7 +18,7 @@ export const PROTOCOL = 2;
 const FIRST_DELAY_MS = 250;
 const DELAY_MAX_MS = 5000;
 /** Close codes after which another attempt cannot succeed. */
-const FINAL_CODES = new Set([4400, 4401, 4426]);
+const FINAL_CODES = new Set([4400, 4401, 4404, 4426]);
 
 /**
  * Delay before the next attempt, in ms. It doubles each time and has a random part, so that many
@@ -30,6 +30,7 @@ export const delayBefore = (failures, random) => Math.min(DELAY_MAX_MS, FIRST_DE
 /** A message for the user about a closed connection. @param {number} code @param {string} reason */
 export function closedText(code, reason) {
   if (code === 4401) return "This bridge requires a token. Open the full address that it printed, including everything after the “#”.";
+  if (code === 4404) return `This recording cannot be shown: ${reason}.`;
   if (code === 4426) return `The page and the bridge have different versions (${reason}). Reload the page.`;
   if (code === 4400) return `The bridge could not read a message from this page (${reason}). Reload the page.`;
   if (code === 1013) return "Too many pages are already open. Close one.";

@@ -25,6 +25,7 @@ import { add, boxOf, dot, length, scale, subtract } from "../geometry/math.js";
 /** @typedef {import("../net/messages.js").TimelineMessage} TimelineMessage */
 /** @typedef {import("../net/messages.js").Playback} Playback */
 /** @typedef {import("../net/messages.js").HistoryMessage} HistoryMessage */
+/** @typedef {import("../net/messages.js").RecordingMessage} RecordingMessage */
 /** @typedef {import("../net/messages.js").TextMessage} TextMessage */
 /** A floor: normal · x = offset. @typedef {{ normal: Vec3, offset: number }} Plane */
 
@@ -37,7 +38,7 @@ const FLOOR_COSINE = 0.99;
  *   hello: Hello, node: NodeState, parameters: Parameters, timeline: TimelineMessage | null, playback: Playback | null,
  *   outcome: import("../net/messages.js").OutcomeMessage, reset: number,
  *   notice: { level: string, text: string }, ground: void, connection: boolean,
- *   history: HistoryMessage | null, undoable: void, past: number | null, present: Frame,
+ *   history: HistoryMessage | null, undoable: void, recording: RecordingMessage, past: number | null, present: Frame,
  * }} Topics
  */
 
@@ -88,6 +89,8 @@ export class Simulation extends Emitter {
     this.playback = null;
     /** The past of a live simulation that the page can look back at. @type {HistoryMessage | null} */
     this.history = null;
+    /** The recording that the bridge makes, or the last one. @type {RecordingMessage | null} */
+    this.recording = null;
     /** The newest change of this page that it can undo. @type {import("../net/messages.js").Undoable | null} */
     this.undoable = null;
     /** The present, while the page looks at an earlier state. Everything else is that state then. @type {LiveState | null} */
@@ -389,6 +392,7 @@ export class Simulation extends Emitter {
       case "parameters": this.parameters = message; return this.emit("parameters", message);
       case "timeline": this.timeline = message; return this.emit("timeline", message);
       case "undoable": this.undoable = message.what; return this.emit("undoable", undefined);
+      case "recording": this.recording = message; return this.emit("recording", message);
       case "history": this.history = message; return this.emit("history", message);
       case "playback": this.playback = message; return this.emit("playback", message);
       case "outcome": return this.emit("outcome", message);

@@ -1,0 +1,64 @@
+// The button that records the simulation on the host of the bridge, and the state of the recording,
+// which all pages share.
+
+import { enable, find } from "../ui/dom.js";
+import { describe, isRunning, reasonAgainst, replayAddress } from "./recording-text.js";
+
+export class RecordingControl {
+  /** @param {import("../tools/tool.js").App} app @param {string | null} token */
+  constructor({ simulation, commands }, token) {
+    this.simulation = simulation;
+    this.commands = commands;
+    this.token = token;
+    this.button = find("record", HTMLButtonElement);
+    this.title = this.button.title;
+    this.label = find("record-label", HTMLElement);
+    this.line = find("recording", HTMLElement);
+    this.text = find("recording-text", HTMLOutputElement);
+    this.open = find("recording-open", HTMLAnchorElement);
+    this.close = find("recording-close", HTMLButtonElement);
+    /** For screen readers: the start and the end, but not each number. */
+    this.said = find("recording-said", HTMLElement);
+    /** The user has closed the line of the last recording. */
+    this.isClosed = false;
+    this.button.addEventListener("click", () => this.toggle());
+    this.close.addEventListener("click", () => {
+      this.isClosed = true;
+      this.show();
+    });
+    for (const topic of /** @type {const} */ (["hello", "node", "connection"])) simulation.on(topic, () => this.show());
+    simulation.on("recording", () => this.update());
+  }
+
+  toggle() {
+    if (!this.button.disabled) this.commands.run(isRunning(this.simulation.recording) ? "stop_recording" : "record");
+  }
+
+  update() {
+    const { recording } = this.simulation;
+    if (isRunning(recording)) this.isClosed = false;
+    this.show();
+    const isQuiet = recording === null || recording.state === "idle" || recording.state === "unavailable";
+    const said = isQuiet ? "" : isRunning(recording) ? "Recording." : describe(recording);
+    if (this.said.textContent !== said) this.said.textContent = said;
+  }
+
+  show() {
+    const { recording, isConnected, isReplay, node } = this.simulation;
+    const isNow = isConnected && isRunning(recording);
+    this.button.dataset.title = isNow ? "Stop the recording" : this.title;
+    enable(this.button, reasonAgainst(recording, { isConnected, isReplay, hasNode: node?.state === "alive" }));
+    this.button.setAttribute("aria-pressed", String(isNow));
+    const label = isNow ? "Stop" : "Record";
+    if (this.label.textContent !== label) this.label.textContent = label;
+    const hasEnded = recording?.state === "finished" || recording?.state === "failed";
+    this.line.hidden = !isNow && !(isConnected && hasEnded && !this.isClosed);
+    if (recording === null || this.line.hidden) return;
+    this.line.dataset.state = recording.state;
+    this.line.title = recording.path ?? "";
+    this.text.textContent = describe(recording);
+    this.close.hidden = isNow;
+    this.open.hidden = recording.name === null;
+    if (recording.name !== null) this.open.href = replayAddress(recording.name, this.token);
+  }
+}
