@@ -21,8 +21,9 @@ mod replay;
 mod support;
 mod time;
 
-/// Recordings that the page makes.
+/// Recordings and pictures of the page.
 mod save {
+    mod files;
     mod recording;
 }
 

@@ -7,6 +7,7 @@ import { ColorLegend } from "./legend/color-legend.js";
 import { Commands } from "./net/commands.js";
 import { Controls } from "./ui/controls.js";
 import { find } from "./ui/dom.js";
+import { Composition } from "./save/composition.js";
 import { ForceLegend } from "./legend/force-legend.js";
 import { Renderer } from "./gl/renderer.js";
 import { Hud } from "./ui/hud.js";
@@ -15,6 +16,7 @@ import { Hint, Question } from "./ui/prompts.js";
 import { parseLink } from "./ui/link.js";
 import { Overlay } from "./ui/overlay.js";
 import { Inspector } from "./panel/inspector.js";
+import { PictureButton } from "./save/picture.js";
 import { RecordingControl } from "./save/recording.js";
 import { Panel } from "./panel/panel.js";
 import { Connector } from "./net/socket.js";
@@ -115,6 +117,9 @@ function start(renderer) {
   const forceLegend = new ForceLegend(app);
   const colorLegend = new ColorLegend(app);
   colorLegend.choose(link.colour);
+  const composition = new Composition(app, overlay.canvas, [colorLegend, forceLegend]);
+  const picture = new PictureButton(renderer, composition, banner);
+  controls.onPicture = () => picture.save();
   new RecordingControl(app, token);
   const wishes = new Wishes(simulation, commands, {
     forces: () => renderer.toggles.forces || inspector.wantsForces(),

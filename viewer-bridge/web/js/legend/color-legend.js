@@ -6,6 +6,7 @@ import { sceneUnits } from "../ui/units.js";
 import { niceCeiling } from "../geometry/round.js";
 import { HEAT_STOPS, KIND_COLORS } from "../gl/theme.js";
 import { KINDS, strainGains, tensionGains } from "../state/quantity.js";
+import { shownTexts } from "./legend-text.js";
 import { ValueScan } from "./value-scan.js";
 
 /** @typedef {import("../state/quantity.js").Quantity} Quantity */
@@ -183,6 +184,16 @@ export class ColorLegend {
     if (quantity === "speed" || found === null) return "";
     const rounding = found.resolution > RESOLUTION_SHARE * this.app.renderer.coloring.high ? ` Positions are rounded: ±${readable(found.resolution, this.unit())}.` : "";
     return `${quantity === "tension" ? tensionNote(found, this.app.simulation.node?.method ?? null) : ""}${rounding}`.trim();
+  }
+
+  /** The legend for a picture, or null if it is not shown. @returns {import("./legend-text.js").LegendText | null} */
+  describe() {
+    if (this.element.hidden) return null;
+    const title = this.choice.selectedOptions[0]?.textContent ?? "";
+    const kinds = [...this.kinds.children].map((one) => ({ text: one.textContent ?? "", color: one.querySelector("i")?.style.background ?? "" }));
+    if (this.quantity === "kind") return { title, kinds, lines: [] };
+    const ends = [...this.ends.children].map((one) => one.textContent ?? "");
+    return { title, ends, lines: shownTexts(this.extremes, this.note) };
   }
 
   showKinds() {

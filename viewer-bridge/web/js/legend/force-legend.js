@@ -4,6 +4,7 @@ import { find } from "../ui/dom.js";
 import { readable } from "../ui/format.js";
 import { sceneUnits } from "../ui/units.js";
 import { niceFloor } from "../geometry/round.js";
+import { FORCE_COLOR } from "../gl/theme.js";
 
 /** Longest arrow of the legend, in CSS pixels. */
 const LENGTH_MAX = 120;
@@ -23,6 +24,12 @@ export class ForceLegend {
     const isWanted = renderer.toggles.forces && simulation.isConnected;
     if (this.legend.hidden === isWanted) this.legend.hidden = !isWanted;
     if (isWanted) this.show();
+  }
+
+  /** The legend for a picture, or null if it is not shown. @returns {import("./legend-text.js").LegendText | null} */
+  describe() {
+    if (this.legend.hidden) return null;
+    return { title: `Force ${this.scale.textContent}`, arrow: { length: Number.parseFloat(this.arrow.style.width) || 0, color: FORCE_COLOR }, lines: [] };
   }
 
   show() {

@@ -37,6 +37,8 @@ export class Controls {
     /** Called for the keys of the inspector. */
     this.onInspect = () => {};
     this.onFollow = () => {};
+    /** Called for the key of the picture. */
+    this.onPicture = () => {};
     this.listen();
     listenToKeys(this.keymap());
     returnFocus(input.canvas);
@@ -54,7 +56,6 @@ export class Controls {
     this.scene.addEventListener("click", () => this.openMenu());
     for (const button of this.modes) button.addEventListener("click", () => this.setMode(/** @type {Mode} */ (button.dataset.mode)));
     find("frame", HTMLButtonElement).addEventListener("click", () => this.views.fit());
-    find("picture", HTMLButtonElement).addEventListener("click", () => this.views.savePicture());
     find("link", HTMLButtonElement).addEventListener("click", () => this.views.copyLink());
     find("help", HTMLButtonElement).addEventListener("click", () => this.help.showModal());
     this.panelToggle.addEventListener("click", () => this.togglePanel());
@@ -73,7 +74,7 @@ export class Controls {
       r: () => { if (!this.reset.disabled) app.commands.run("reset"); },
       "ctrl+z": () => this.undo.run(),
       f: () => views.fit(),
-      s: () => views.savePicture(),
+      s: () => this.onPicture(),
       v: () => this.togglePanel(),
       h: () => views.toggle("heat"),
       e: () => views.toggle("sticks"),

@@ -1,9 +1,8 @@
-// The view: display toggles, first view of a scene, saved pictures, links.
+// The view: display toggles, first view of a scene, links.
 
 import { find } from "./dom.js";
 import { firstViewBox, fittedBox } from "../state/framing.js";
 import { formatLink } from "./link.js";
-import { save } from "./save.js";
 
 /** @typedef {import("./link.js").CameraPose} CameraPose */
 
@@ -126,15 +125,6 @@ export class Views {
       button.setAttribute("aria-pressed", String(renderer.toggles[key]));
     }
     renderer.isDirty = true;
-  }
-
-  savePicture() {
-    const { renderer, simulation } = this.app;
-    renderer.draw();
-    renderer.canvas.toBlob((blob) => {
-      if (blob === null) return this.banner.notify("The picture could not be saved.", "error");
-      save(blob, `${simulation.scene?.name || "catenary"}-${simulation.frame?.step ?? 0}.png`);
-    }, "image/png");
   }
 
   /** Writes the view into the address, and copies the address to the clipboard. */
