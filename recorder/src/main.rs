@@ -96,6 +96,12 @@ fn run(command: &Command) -> anyhow::Result<Exit> {
     }
 }
 
+/// Returns `true` for an error of the command line of `export`.
+fn is_of_export(error: &clap::Error) -> bool {
+    let usage = error.get(ContextKind::Usage);
+    usage.is_some_and(|usage| usage.to_string().contains("recorder export "))
+}
+
 /// Replaces the text of clap for an unknown option, which speaks of an "unexpected argument".
 fn explain(error: clap::Error) -> clap::Error {
     let (ErrorKind::UnknownArgument, Some(argument)) =
@@ -106,7 +112,8 @@ fn explain(error: clap::Error) -> clap::Error {
     let suggestion = error.get(ContextKind::SuggestedArg);
     let hint = suggestion.map_or_else(String::new, |name| format!(" (did you mean '{name}'?)"));
     let text = if argument.to_string().starts_with('-') {
-        format!("there is no option '{argument}' here{hint}")
+        let formats = if is_of_export(&error) { export_command::formats() } else { String::new() };
+        format!("there is no option '{argument}' here{hint}{formats}")
     } else {
         format!("there is one argument too many: '{argument}'")
     };

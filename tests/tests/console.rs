@@ -282,7 +282,14 @@ fn import_says_which_densities_and_pins_it_accepts() {
         assert_eq!((refused.code, refused.stdout.as_str()), (Some(2), ""), "{options}");
         assert!(refused.stderr.contains(expected), "{}", refused.stderr);
     }
+    let large = sandbox.write("large.obj", "v 0 0 0\nv 100 0 0\nv 0 145 0\nf 1 2 3\n");
+    let warning = run(&sandbox, &format!("import {large}")).stderr;
+    assert!(warning.contains("give a mesh in another unit --scale, such as 0.01 "), "{warning}");
+    assert_eq!(run(&sandbox, &format!("import {large} --scale 0.01")).stderr, "");
     let unpinned = run(&sandbox, &format!("import {mesh} --pin y>5"));
     assert_eq!(unpinned.code, Some(0));
-    assert_eq!(unpinned.stderr, "warning: --pin matches no particle of the shape\n");
+    assert_eq!(
+        unpinned.stderr,
+        "warning: --pin matches no particle of the shape (x 0 to 1, y 0 to 1, z 0 to 0)\n"
+    );
 }

@@ -14,6 +14,7 @@ use clap::CommandFactory;
 use sim_contract::{Stop, console, report_bus_errors};
 use tokio::runtime;
 use tokio::signal::unix::{SignalKind, signal};
+use viewer_bridge::message::Mode;
 use viewer_bridge::pages::assets::Assets;
 use viewer_bridge::request::requests;
 use viewer_bridge::scene::catalog::Catalog;
@@ -104,7 +105,8 @@ async fn serve(source: Box<dyn Source>, servers: Servers, stop: Stop) -> anyhow:
     let server = Server::bind(pages).await?;
     let (sender, requests) = requests();
     let shutdown = Shutdown::default();
-    let hub = Arc::new(Hub::new(source.mode(), source.scenes(), sender.clone()));
+    let mode = source.mode();
+    let hub = Arc::new(Hub::new(mode, source.scenes(), sender.clone()));
     let mut sinks = Sinks::new(shutdown.clone());
     sinks.add(Arc::<Hub>::clone(&hub));
     let recordings = recording.map(|RecordingPlan { endpoint, folder }| {
@@ -120,7 +122,7 @@ async fn serve(source: Box<dyn Source>, servers: Servers, stop: Stop) -> anyhow:
         }
     };
     let source_thread = start_source(source, sinks, requests, shutdown.clone())?;
-    announce(&server, foxglove.as_ref());
+    announce(&server, foxglove.as_ref(), mode);
     let serve_foxglove = async {
         if let Some(foxglove) = foxglove {
             foxglove.serve(shutdown.clone()).await;
@@ -161,7 +163,7 @@ fn stop_signal(stop: &Stop) -> anyhow::Result<impl Future<Output = ()> + use<>> 
 }
 
 /// Prints the addresses.
-fn announce(server: &Server, foxglove: Option<&FoxgloveServer>) {
+fn announce(server: &Server, foxglove: Option<&FoxgloveServer>, mode: Mode) {
     let url = server.url();
     if let Some(warning) = open_files_warning() {
         note(&warning);
@@ -171,7 +173,13 @@ fn announce(server: &Server, foxglove: Option<&FoxgloveServer>) {
     }
     note(&format!("ready {url}"));
     if !server.is_local() {
-        note("warning: other machines can connect; anyone with the token can control the node");
+        let controlled = match mode {
+            Mode::Live => "the node",
+            Mode::Replay => "the playback",
+        };
+        note(&format!(
+            "warning: other machines can connect; anyone with the token can control {controlled}"
+        ));
     }
 }
 

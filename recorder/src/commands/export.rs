@@ -105,6 +105,12 @@ pub(crate) struct ExportArgs {
     as_json: AsJson,
 }
 
+/// Returns the options of the formats in parentheses, for the error of an unknown option.
+pub(crate) fn formats() -> String {
+    let options: Vec<_> = format_args::options().map(|option| format!("--{option}")).collect();
+    format!(" (formats: {})", options.join(", "))
+}
+
 pub(crate) fn run(args: &ExportArgs) -> anyhow::Result<Exit> {
     args.check().unwrap_or_else(|error| exit::with_usage(&error));
     let stop = Stop::install()?;
@@ -116,6 +122,9 @@ pub(crate) fn run(args: &ExportArgs) -> anyhow::Result<Exit> {
     let needed = log.selection().require_all_particles("`recorder export`");
     needed.with_context(|| path.clone())?;
     let format = args.format.format().context("one of the formats is required")?;
+    if let Some(warning) = format.extension_warning() {
+        output::note(&warning);
+    }
     refuse_own_input(&open_regular_file(&args.file)?, format.target())?;
     let survey = survey(args, log, &path)?;
     if let Format::Data(DataFormat::Ros2, folder) = format {

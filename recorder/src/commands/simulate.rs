@@ -14,7 +14,7 @@ use recorder::{
 };
 use serde::Serialize;
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
-use sim_contract::{Stop, printable_line};
+use sim_contract::{Outcome, Stop, printable_line};
 use sim_solver::{Scene, Solver};
 
 use crate::cli::exit::{Exit, with_usage};
@@ -38,7 +38,7 @@ const STEPS_PER_UPDATE: u64 = 256;
     simulated with other commands, from the last complete state before the first change to its last step; \
     `recorder diff` shows the effect.\n\n\
     Exit codes: 0 all steps computed; 1 failed; 3 interrupted before the last \
-    step, or recording truncated or damaged.\n\nExamples:\n  \
+    step, or recording truncated or damaged. A rejected command is an outcome, not a failure.\n\nExamples:\n  \
     recorder simulate curtain --steps 24000\n  \
     recorder simulate curtain --steps 2400 -o drag.mcap --commands drag.jsonl\n  \
     recorder simulate rope --steps 480 -o rope.mcap --forces\n  \
@@ -283,9 +283,17 @@ fn note_rejections(result: &SimulationResult) {
             kind["kind"].as_str().unwrap_or("a command"),
             row.client_id,
             row.sequence,
-            row.reason
+            cause(outcome)
         ));
     }
+}
+
+/// Returns the reason of a rejection with its meaning and the allowed values.
+fn cause(outcome: &Outcome) -> String {
+    let Some(reason) = outcome.reason() else { return outcome.reason_name().to_owned() };
+    let allowed = outcome.command.action().allowed_values(reason);
+    let allowed = allowed.map_or_else(String::new, |allowed| format!(" (allowed: {allowed})"));
+    format!("{}: {reason}{allowed}", reason.name())
 }
 
 /// The part of a summary that depends on the kind of simulation.

@@ -26,14 +26,14 @@ fn run() -> Result<(), Box<dyn Error>> {
     let mut client = Client::attach(&endpoint)?;
     let rate_hz = client.topology(TIMEOUT)?.ok_or("the node has no scene")?.header.rate_hz;
     let snapshot = client.latest_snapshot(TIMEOUT)?.ok_or("the node publishes nothing")?;
-    let start = snapshot.particles().get(particle as usize).ok_or("no such particle")?.position;
+    let particles = snapshot.particles();
+    let unknown = format!("no such particle (allowed: 0 to {})", particles.len().max(1) - 1);
+    let start = particles.get(particle as usize).ok_or(unknown)?.position;
     drop(snapshot);
     // The outcome proves that a command took effect, and names the first step that shows it.
     let over_s = GRAB_OVER_S_DEFAULT;
     let grab = client.request(Action::Grab { particle, target: start, over_s }, TIMEOUT)?;
-    if !grab.is_applied() {
-        return Err(format!("the grab was rejected: {}", grab.reason_name()).into());
-    }
+    grab.is_applied().then_some(()).ok_or_else(|| format!("rejected: {}", grab.reason_name()))?;
     let mut step = grab.step;
     for index in 1..=MOVES {
         // Simulated time sets the pace: one move every 1/60 s.

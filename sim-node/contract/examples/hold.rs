@@ -9,6 +9,7 @@ use std::{error::Error, process::ExitCode, time::Duration};
 use sim_contract::{Action, Client, Endpoint, ParticleFlags};
 
 const TIMEOUT: Duration = Duration::from_secs(5);
+const NO_PENDULUM: &str = "the scene is no pendulum: `sim-node ctl load pendulum` loads one";
 /// Displacement of the pivot against the mass, per speed of the mass, in seconds.
 const GAIN: f32 = 0.25;
 /// Time in which the pivot follows: an immediate move would jerk the mass.
@@ -28,7 +29,7 @@ fn run() -> Result<(), Box<dyn Error>> {
     let (mut rest, mut speed) = (None, 0.0);
     for _ in 0..steps {
         let snapshot = client.next_turn(TIMEOUT)?.ok_or("the node is paused, or gone")?;
-        let [pivot, mass] = snapshot.particles() else { return Err("not a pendulum".into()) };
+        let [pivot, mass] = snapshot.particles() else { return Err(NO_PENDULUM.into()) };
         let [x, y, z] = *rest.get_or_insert(pivot.position);
         // The pivot gives way against the motion of the mass, which damps it as a viscous fluid would.
         let target = [x - GAIN * mass.velocity[0], y, z - GAIN * mass.velocity[2]];
@@ -40,7 +41,6 @@ fn run() -> Result<(), Box<dyn Error>> {
         speed = mass.velocity.iter().map(|axis| axis * axis).sum::<f32>().sqrt();
         drop(snapshot);
         client.ready()?;
-        // The outcomes of the command before.
         while let Some(outcome) = client.next_outcome(Duration::ZERO)? {
             outcome.is_applied().then_some(()).ok_or_else(|| outcome.reason_name())?;
         }

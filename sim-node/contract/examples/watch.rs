@@ -19,6 +19,10 @@ fn main() -> ExitCode {
 fn watch() -> Result<(), Box<dyn Error>> {
     let (endpoint, arguments) = Endpoint::from_env_and_args()?;
     let argument = arguments.first().map_or("10", String::as_str);
+    if argument == "--help" {
+        println!("Usage: watch [--domain DOMAIN] [--name NAME] [SNAPSHOTS]");
+        return Ok(());
+    }
     let count: u64 = argument.parse().map_err(|_| format!("'{argument}' is not a count"))?;
 
     // A client connects to a service when a method first needs it: this one only to particles.

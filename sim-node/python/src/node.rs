@@ -99,7 +99,7 @@ impl Node {
     }
 
     /// Returns the allowed indices after the rejection of an unknown one, if the node tells them.
-    fn allowed_indices(&self, py: Python<'_>, reason: Option<Reason>) -> Option<String> {
+    pub(crate) fn allowed_indices(&self, py: Python<'_>, reason: Option<Reason>) -> Option<String> {
         let status = || self.latched(py, Client::status).ok();
         let count = match reason? {
             Reason::UnknownParticle => status()?.particle_count as usize,

@@ -48,6 +48,7 @@ pub(crate) struct CheckArgs {
         hinges take their place, so the stiffness does not depend on the mesh. Faces without\n\
         area, duplicate faces and vertices without a face are left out with a warning.\n\nExamples:\n  \
         sim-node import shirt.obj --pin 'y > 1.45' -o shirt.toml && sim-node run ./shirt.toml\n  \
+        sim-node import skirt.obj --scale 0.01 --pin 'y > 0.95' -o skirt.toml\n  \
         sim-node import hat.obj --bending 1e-4 --rest loaded -o hat.toml\n  \
         sim-node import net.obj --density 0.05 --pin 'group rim' --bend 0.01 > net.toml"
 )]
@@ -60,6 +61,10 @@ pub(crate) struct ImportArgs {
     /// Replace an existing file
     #[arg(long)]
     pub(crate) overwrite: bool,
+    /// Factor of all coordinates, such as 0.01 for a mesh in centimetres. --pin compares the scaled ones
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, allow_negative_numbers = true,
+        value_parser = number_within(NumberRange { max: 1e7, text: "more than 0, at most 1e7", ..NumberRange::POSITIVE }))]
+    pub(crate) scale: f32,
     /// Mass per area, in kg per square unit, > 0
     #[arg(long, value_name = "KG", default_value_t = 0.2, allow_negative_numbers = true,
         value_parser = number_within(NumberRange::POSITIVE))]

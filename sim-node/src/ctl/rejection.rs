@@ -30,7 +30,9 @@ fn remedy(
         Reason::UnknownAnchor => anchor_count(client, timeout)?,
         Reason::UnknownCollider => client.colliders(timeout).ok()?.colliders.len(),
         Reason::UnknownStep if is_before_run(action, outcome.step) => {
-            return Some(age_of_run(outcome.step, status()?.rate_hz));
+            let rate_hz = status()?.rate_hz;
+            let newest = client.latest_snapshot(timeout).ok().flatten()?;
+            return Some(age_of_run(outcome.step, rate_hz, first_step(newest.header())));
         }
         Reason::UnknownStep => {
             let snapshot = client.latest_snapshot(timeout).ok().flatten()?;
@@ -54,22 +56,33 @@ fn is_before_run(action: &Action, step: u64) -> bool {
     u64::from(*back_steps) >= step
 }
 
-/// Remedy of a rewind to a time before the run.
-fn age_of_run(step: u64, rate_hz: u32) -> String {
+/// Remedy of a rewind to a time before the run. The states before `first_step` belong to another scene.
+fn age_of_run(step: u64, rate_hz: u32, first_step: u64) -> String {
     let seconds = step.saturating_sub(1) as f64 / f64::from(rate_hz);
-    format!("the run is only {seconds:.2} s old; `ctl rewind --to-step 0` goes to its start")
+    let start = match first_step {
+        0 => "`ctl rewind --to-step 0` goes to its start".to_owned(),
+        _ => start_of_scene(first_step),
+    };
+    format!("the run is only {seconds:.2} s old; {start}")
+}
+
+/// Returns the step at which the scene began.
+fn first_step(newest: &SnapshotHeader) -> u64 {
+    newest.step.saturating_sub(newest.scene_step)
+}
+
+fn start_of_scene(first: u64) -> String {
+    format!(
+        "the scene began at step {first} with a load or reset; `ctl rewind --to-step {first}` goes there"
+    )
 }
 
 /// Remedy of a rewind, rejected before `step` was made, to a time before the scene began.
 fn age_of_scene(action: &Action, step: u64, newest: &SnapshotHeader) -> Option<String> {
     let Action::Rewind { to_step, back_steps } = action else { return None };
     let back_steps = back_steps.map(|back_steps| step.saturating_sub(1 + u64::from(back_steps)));
-    let first = newest.step.saturating_sub(newest.scene_step);
-    (to_step.or(back_steps)? < first).then(|| {
-        format!(
-            "the scene began at step {first} with a load or reset; `ctl rewind --to-step {first}` goes there"
-        )
-    })
+    let first = first_step(newest);
+    (to_step.or(back_steps)? < first).then(|| start_of_scene(first))
 }
 
 /// Remedy of a rejection by a replay, where it is not that of a node.
@@ -137,7 +150,7 @@ fn missing_condition(action: &Action) -> Option<&'static str> {
         Action::DriveBody { .. } => {
             "the collider is no body; the scene makes it one with body = { mass, inertia }"
         }
-        Action::Step { .. } => "the node is not paused",
+        Action::Step { .. } => "the node runs; `ctl pause` pauses it",
         Action::Load { .. } => "it needs more memory than is available; see the node's messages",
         Action::Rewind { .. } => "the node keeps no history; start it without --history 0",
         Action::Pin { .. }
@@ -159,7 +172,17 @@ mod tests {
         // Before step 240 the newest state is that of step 239.
         assert!(is_before_run(&back(240), 240) && !is_before_run(&back(239), 240));
         assert!(!is_before_run(&Action::Rewind { to_step: Some(500), back_steps: None }, 240));
-        assert!(age_of_run(241, 240).starts_with("the run is only 1.00 s old; "));
+        let start = "the run is only 1.00 s old; `ctl rewind --to-step 0` goes to its start";
+        assert_eq!(age_of_run(241, 240, 0), start);
+    }
+
+    #[test]
+    fn a_rewind_before_the_run_names_the_first_step_of_a_loaded_scene() {
+        assert_eq!(
+            age_of_run(241, 240, 200),
+            "the run is only 1.00 s old; the scene began at step 200 with a load or reset; `ctl rewind \
+             --to-step 200` goes there"
+        );
     }
 
     #[test]
@@ -175,6 +198,12 @@ mod tests {
         }
         assert_eq!(remedy(Some(1000), None), None);
         assert_eq!(remedy(None, Some(20)), None);
+    }
+
+    #[test]
+    fn a_step_of_a_node_that_runs_names_the_pause() {
+        let remedy = fixed_remedy(&Action::Step { count: 1 }, Reason::NoEffectHere);
+        assert_eq!(remedy.as_deref(), Some("the node runs; `ctl pause` pauses it"));
     }
 
     #[test]

@@ -21,6 +21,10 @@ pub(crate) fn import(args: &ImportArgs) -> anyhow::Result<()> {
         // The user knows the only generator by the options.
         let warning = warning.replace("generate[0].pinned", "--pin");
         let warning = warning.replace("generate[0].bending", "--bending");
+        let warning = warning.replace(
+            "give a mesh in another unit a `scale`",
+            "give a mesh in another unit --scale",
+        );
         output::note(&format!("warning: {warning}"));
     }
     let result = format!(
@@ -46,7 +50,7 @@ pub(crate) fn import(args: &ImportArgs) -> anyhow::Result<()> {
 
 /// TOML of a scene with one generator, which reads the mesh.
 fn scene_text(args: &ImportArgs) -> String {
-    let ImportArgs { density, structural, shear, bend, .. } = args;
+    let ImportArgs { scale, density, structural, shear, bend, .. } = args;
     let (of_bends, bending) = match args.bending {
         Some(bending) => {
             let rest = quoted_text(args.rest.as_deref().unwrap_or("flat"));
@@ -56,7 +60,7 @@ fn scene_text(args: &ImportArgs) -> String {
     };
     format!(
         "version = 1\nname = {name}\n[solver]\nsubsteps = 8\n[[generate]]\nshape = \"obj\"\n\
-         path = {path}\ndensity = {density}\npinned = {pin}\n\
+         path = {path}\nscale = {scale}\ndensity = {density}\npinned = {pin}\n\
          compliance = {{ structural = {structural}, shear = {shear}{of_bends} }}\n{bending}",
         name =
             quoted_text(&Path::new(&args.mesh).file_stem().unwrap_or_default().to_string_lossy()),
@@ -71,7 +75,9 @@ fn import_error(error: SceneError) -> anyhow::Error {
     match field.rsplit('.').next() {
         Some("path") => anyhow!("{problem}"),
         Some("pinned") => anyhow!("--pin: {problem}"),
-        Some(key @ ("density" | "structural" | "shear" | "bend" | "bending" | "rest")) => {
+        Some(
+            key @ ("scale" | "density" | "structural" | "shear" | "bend" | "bending" | "rest"),
+        ) => {
             anyhow!("--{key}: {problem}")
         }
         _ => error.into(),
@@ -142,6 +148,26 @@ mod tests {
         assert!(rest.contains("--bending <N M>"), "{rest}");
         let word = refused(&["--bending", "1", "--rest", "bent"]);
         assert!(word.contains("[possible values: flat, loaded]"), "{word}");
+    }
+
+    #[test]
+    fn a_scale_applies_to_the_mesh_and_to_its_pins() {
+        let mesh = "v 0 0 0\nv 100 0 0\nv 0 145 0\nf 1 2 3\n";
+        let scaled = scene(mesh, &["--scale", "0.01", "--pin", "y > 1.4"]).unwrap();
+        assert_eq!(scaled.counts().pins, 1);
+        assert_eq!(scaled.warnings(), Vec::<String>::new());
+        let warnings = scene(mesh, &["--pin", "y > 150"]).unwrap().warnings().join("\n");
+        assert!(
+            warnings.contains("give a mesh in another unit a `scale`, such as 0.01 "),
+            "{warnings}"
+        );
+        assert!(
+            warnings
+                .contains("matches no particle of the shape (x 0 to 100, y 0 to 145, z 0 to 0)"),
+            "{warnings}"
+        );
+        let far = error(mesh, &["--scale", "1e6"]);
+        assert_eq!(far, "--scale: a vertex is at 100000000 (allowed: -1e7 to 1e7)");
     }
 
     #[test]

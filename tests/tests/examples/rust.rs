@@ -42,6 +42,25 @@ fn hold_brings_a_pendulum_to_rest() {
 }
 
 #[test]
+fn watch_prints_its_usage() {
+    let printed = Process::run(Program::Watch, &Sandbox::new(), &["--help"]).success();
+    assert!(printed.starts_with("Usage: watch "), "{printed}");
+}
+
+#[test]
+fn the_examples_name_the_allowed_particles_and_the_scene_that_they_need() {
+    let sandbox = Sandbox::new();
+    let _node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
+    let grab = Process::run(Program::Grab, &sandbox, &["9000"]);
+    assert_eq!(grab.stderr, "error: no such particle (allowed: 0 to 167)\n");
+    let hold = Process::run(Program::Hold, &sandbox, &[]);
+    assert_eq!(
+        hold.stderr,
+        "error: the scene is no pendulum: `sim-node ctl load pendulum` loads one\n"
+    );
+}
+
+#[test]
 fn the_examples_stay_short() {
     for source in [
         include_str!("../../../sim-node/contract/examples/watch.rs"),

@@ -308,6 +308,10 @@ fn wrong_option_values_state_what_is_expected() {
             &["info", "run.mcap", "--jsn"],
             "there is no option '--jsn' here (did you mean '--json'?)",
         ),
+        (
+            &["export", "run.mcap", "--fbx", "a.fbx"],
+            "there is no option '--fbx' here (formats: --png, --svg, ",
+        ),
     ] {
         let refused = recorder(&sandbox, args);
         assert_eq!(refused.code, Some(2), "{}", refused.stderr);

@@ -231,3 +231,31 @@ fn changes_without_a_place_in_the_recording_are_refused() {
         assert!(!fs::exists(&out).unwrap());
     }
 }
+
+#[test]
+fn a_setting_that_every_scene_rejects_is_a_usage_error() {
+    let sandbox = Sandbox::new();
+    let run = simulate_rope(&sandbox, "a", "");
+    for (change, expected) in [
+        ("100:wind=[0,0,9]", "there is no such parameter (allowed: gravity, damping, "),
+        ("100:damping=-5", "a value is out of its range (allowed: a number >= 0, "),
+        ("100:gravity=-9", "a value is out of its range (allowed: three numbers, "),
+    ] {
+        let refused = recorder(&sandbox, &["simulate", &run, "--set", change]);
+        assert_eq!(refused.code, Some(2), "{}", refused.stderr);
+        assert!(refused.stderr.contains(expected), "{}", refused.stderr);
+    }
+    let applied = recorder(&sandbox, &["simulate", &run, "--set", "100:damping=5"]);
+    assert_eq!((applied.code, applied.stderr.as_str()), (Some(0), ""));
+}
+
+#[test]
+fn a_rejected_command_is_an_outcome_and_its_warning_names_the_allowed_values() {
+    let sandbox = Sandbox::new();
+    let line = r#"{"step":100,"kind":"set","parameter":"wind","value":1}"#;
+    let commands = sandbox.write("b.jsonl", line);
+    let done = recorder(&sandbox, &["simulate", "rope", "--steps", "480", "--commands", &commands]);
+    assert_eq!(done.code, Some(0), "{}", done.stderr);
+    let expected = "unknown_parameter: there is no such parameter (allowed: gravity, damping, ";
+    assert!(done.stderr.contains(expected), "{}", done.stderr);
+}

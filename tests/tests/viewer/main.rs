@@ -208,7 +208,8 @@ fn pages_show_parameters_that_other_clients_set() {
 #[test]
 fn pages_wait_for_a_node_and_report_when_it_is_lost_and_back() {
     let sandbox = Sandbox::new();
-    let bridge = Bridge::start(&sandbox);
+    let mut bridge = Bridge::start(&sandbox);
+    bridge.process.wait_for_line("waiting: no node runs as 'sim'");
     let mut page = bridge.page();
     let text = page.text(|text| text["type"] == "node" && text["text"] != "");
     assert_eq!(text["state"], "none");

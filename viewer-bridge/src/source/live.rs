@@ -77,9 +77,13 @@ impl Live {
             NodeState::Alive | NodeState::Lost => NodeState::Lost,
         };
         let text = error.to_string();
-        // A missing node is no problem of the bridge. Anything else needs a person at its terminal.
-        if text != self.node.text && !matches!(error, AttachError::NoNode { .. }) {
-            note(&format!("warning: {text}"));
+        if text != self.node.text {
+            match (error, state) {
+                // The user may wait for a picture. A node that ends later is no problem of the bridge.
+                (AttachError::NoNode { .. }, NodeState::None) => note(&format!("waiting: {text}")),
+                (AttachError::NoNode { .. }, _) => {}
+                _ => note(&format!("warning: {text}")),
+            }
         }
         self.publish_node(sinks, Node { state, text, ..Node::default() });
     }

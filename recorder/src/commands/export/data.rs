@@ -24,6 +24,20 @@ pub(super) enum DataFormat {
     Ros2,
 }
 
+impl DataFormat {
+    /// Returns the extensions of the file; none for a folder.
+    pub(super) fn extensions(self) -> &'static [&'static str] {
+        match self {
+            Self::Npz => &["npz"],
+            Self::Csv => &["csv"],
+            Self::Pc2 => &["pc2"],
+            Self::Usda => &["usda", "usd"],
+            Self::Foxglove => &["mcap"],
+            Self::Vtk | Self::Obj | Self::Ros2 => &[],
+        }
+    }
+}
+
 /// The result, as printed.
 #[derive(Debug, Serialize)]
 pub(super) struct Written {

@@ -2,7 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use clap::Args as _;
+
 use super::data::DataFormat;
+use crate::cli::output::path_text;
 use crate::export::pictures::target::PictureFormat;
 
 /// The formats. One of them is required.
@@ -66,12 +69,35 @@ impl Format<'_> {
         }
     }
 
+    /// Returns a warning if the file has the extension of another format.
+    pub(super) fn extension_warning(&self) -> Option<String> {
+        let expected = match self {
+            // An animation is a PNG file, which has either extension.
+            Self::Animation(_) => &["png", "apng"][..],
+            Self::Data(format, _) => format.extensions(),
+            Self::Pictures(..) => &[],
+        };
+        let extension = self.target().extension()?;
+        let is_known = expected.iter().any(|known| extension.eq_ignore_ascii_case(known));
+        let first = expected.first().filter(|_| !is_known)?;
+        let target = path_text(self.target());
+        Some(format!("warning: programs expect the extension .{first} for the format of {target}"))
+    }
+
     /// Returns the file or the folder to write.
     pub(super) fn target(&self) -> &Path {
         match self {
             Self::Pictures(_, target) | Self::Animation(target) | Self::Data(_, target) => target,
         }
     }
+}
+
+/// Returns the names of the options of all formats.
+pub(super) fn options() -> impl Iterator<Item = String> {
+    let command = FormatArgs::augment_args(clap::Command::new("formats"));
+    let names: Vec<_> =
+        command.get_arguments().filter_map(|one| one.get_long()).map(str::to_owned).collect();
+    names.into_iter()
 }
 
 impl FormatArgs {
@@ -96,5 +122,30 @@ impl FormatArgs {
             .filter_map(|(path, format)| Some(Format::Data(format, path.as_deref()?)));
         let animation = self.apng.as_deref().map(Format::Animation);
         pictures.chain(animation).chain(data).next()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_with_the_extension_of_another_format_causes_a_warning() {
+        let warning =
+            |format: DataFormat, path| Format::Data(format, Path::new(path)).extension_warning();
+        assert_eq!(
+            warning(DataFormat::Pc2, "x.abc").unwrap(),
+            "warning: programs expect the extension .pc2 for the format of x.abc"
+        );
+        assert!(warning(DataFormat::Npz, "run.csv").is_some());
+        for (format, path) in [
+            (DataFormat::Pc2, "cache.PC2"),
+            (DataFormat::Csv, "/dev/stdout"),
+            (DataFormat::Vtk, "folder.of.files"),
+        ] {
+            assert_eq!(warning(format, path), None, "{path}");
+        }
+        let animation = |path| Format::Animation(Path::new(path)).extension_warning();
+        assert!(animation("run.png").is_none() && animation("run.gif").is_some());
     }
 }

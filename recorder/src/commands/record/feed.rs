@@ -240,9 +240,13 @@ impl Feed {
     /// Begins the time of the recording with its first file, and reports the first step.
     fn begin_file(&mut self, run: &RunDescription) {
         let Some(step) = self.intake.first_step() else { return };
-        if let Some(limit) = &mut self.time_limit {
+        let publish_monotonic_ns = self.intake.last().map(|header| header.publish_monotonic_ns);
+        if let (Some(limit), Some(publish_monotonic_ns)) =
+            (&mut self.time_limit, publish_monotonic_ns)
+        {
             let (run_id, rate_hz) = (run.run_id, run.rate_hz);
-            limit.begin(FirstStep { run_id, step, rate_hz }, monotonic_ns());
+            let first = FirstStep { run_id, step, rate_hz, publish_monotonic_ns };
+            limit.begin(first, monotonic_ns());
         }
         if self.trigger.is_none() {
             output::note(&format!("recording from step {step}"));

@@ -10,7 +10,7 @@ use recorder::{
     FrameReader, LogEnd, LogReader, Message, OutcomeRow, TimedCommand, parse_commands,
     scene_to_simulate, sort_commands,
 };
-use sim_contract::{Action, Stop};
+use sim_contract::{Action, Parameter, ParameterValue, Reason, Stop, ValueForm};
 use sim_solver::{Keyframe, Scene, Solver};
 
 use crate::input::command_source::{COMMANDS_MAX, timed_command};
@@ -40,7 +40,26 @@ pub(super) fn parse_setting(text: &str) -> Result<TimedCommand, String> {
         "step": step, "kind": "set", "parameter": parameter.trim(), "value": value,
     });
     let commands = parse_commands(&line.to_string(), "--set").map_err(|error| error.to_string())?;
-    commands.into_iter().next().ok_or_else(|| FORM.to_owned())
+    let command = commands.into_iter().next().ok_or(FORM)?;
+    match wrong_in_every_scene(&command.action) {
+        Some(reason) => {
+            let allowed = command.action.allowed_values(reason).unwrap_or_default();
+            Err(format!("{reason} (allowed: {allowed})"))
+        }
+        None => Ok(command),
+    }
+}
+
+/// Returns the reason for which every scene rejects a `set`. Others depend on the scene.
+fn wrong_in_every_scene(action: &Action) -> Option<Reason> {
+    let Action::Set { parameter, value, .. } = action else { return None };
+    let Some(parameter) = Parameter::from_name(parameter.as_str()) else {
+        return Some(Reason::UnknownParameter);
+    };
+    let ParameterValue::Number(number) = *value else { return None };
+    let info = parameter.info();
+    let is_allowed = info.form != ValueForm::Vector && info.range.contains(number);
+    (!is_allowed).then_some(Reason::OutOfRange)
 }
 
 /// The steps, states and commands of a recording.

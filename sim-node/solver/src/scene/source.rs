@@ -25,6 +25,12 @@ pub enum LoadError {
         names = builtin::names().collect::<Vec<_>>().join(", ")
     )]
     UnknownName(String),
+    /// The source is a mesh.
+    #[error(
+        "{0} is a mesh, not a scene: `sim-node import {0} -o {stem}.toml` makes a scene of it",
+        stem = Path::new(.0.as_str()).file_stem().unwrap_or_default().display()
+    )]
+    Mesh(String),
     /// The text of the scene is wrong.
     #[error(transparent)]
     Wrong(#[from] SceneError),
@@ -35,6 +41,11 @@ pub enum LoadError {
 #[allow(clippy::case_sensitive_file_extension_comparisons, reason = "exactly the documented rule")]
 pub fn is_path(source: &str) -> bool {
     source.contains('/') || source.ends_with(".toml")
+}
+
+/// Returns `true` for a file of a mesh that `sim-node import` reads.
+fn is_mesh(source: &str) -> bool {
+    Path::new(source).extension().is_some_and(|extension| extension.eq_ignore_ascii_case("obj"))
 }
 
 impl Scene {
@@ -50,6 +61,9 @@ impl Scene {
         source: &str,
         read_file: &dyn Fn(&Path) -> Result<String, String>,
     ) -> Result<Self, LoadError> {
+        if is_mesh(source) {
+            return Err(LoadError::Mesh(source.to_owned()));
+        }
         if !is_path(source) {
             let text =
                 builtin::text(source).ok_or_else(|| LoadError::UnknownName(source.to_owned()))?;
@@ -70,6 +84,19 @@ mod tests {
 
     const MESH: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
     const SCENE: &str = "version = 1\n[[generate]]\nshape = \"obj\"\npath = \"a.obj\"\n";
+
+    #[test]
+    fn a_mesh_is_refused_with_the_command_that_makes_a_scene_of_it() {
+        for source in ["shirt.obj", "./some/shirt.OBJ"] {
+            let error = Scene::load(source, &|_| Err("read".to_owned())).unwrap_err();
+            assert_eq!(
+                error.to_string(),
+                format!(
+                    "{source} is a mesh, not a scene: `sim-node import {source} -o shirt.toml` makes a scene of it"
+                )
+            );
+        }
+    }
 
     #[test]
     fn a_path_is_read_together_with_the_meshes_beside_it() {

@@ -27,6 +27,7 @@ pub(crate) struct FirstStep {
     pub(crate) run_id: u64,
     pub(crate) step: u64,
     pub(crate) rate_hz: u32,
+    pub(crate) publish_monotonic_ns: u64,
 }
 
 impl TimeLimit {
@@ -34,10 +35,13 @@ impl TimeLimit {
         Self { duration, begin_ns: now_ns, first: None }
     }
 
-    /// Counts from this step on, unless another one came before.
+    /// Counts from the publication of this step on, unless another one came before: the step may have waited
+    /// for its reader. The bound is for the clock of another host.
     pub(crate) fn begin(&mut self, first: FirstStep, now_ns: u64) {
         if self.first.is_none() {
-            (self.first, self.begin_ns) = (Some(first), now_ns);
+            let earliest_ns = now_ns.saturating_sub(BEHIND_NS);
+            self.begin_ns = first.publish_monotonic_ns.clamp(earliest_ns, now_ns);
+            self.first = Some(first);
         }
     }
 
@@ -74,8 +78,9 @@ mod tests {
     use super::*;
 
     const DURATION: Duration = Duration::from_secs(5);
-    const FIRST: FirstStep = FirstStep { run_id: 7, step: 100, rate_hz: 240 };
     const BEGIN_NS: u64 = SECOND_NS / 10;
+    const FIRST: FirstStep =
+        FirstStep { run_id: 7, step: 100, rate_hz: 240, publish_monotonic_ns: BEGIN_NS };
     const END_NS: u64 = BEGIN_NS + 5 * SECOND_NS;
 
     fn at(step: u64) -> SnapshotHeader {
@@ -99,6 +104,23 @@ mod tests {
             later_file.is_reached(Some(&at(1300)), END_NS),
             "a later file counts from the first"
         );
+    }
+
+    #[test]
+    fn the_wait_of_the_first_step_for_the_recorder_makes_no_recording_longer() {
+        let read_at = |now_ns| {
+            let mut limit = TimeLimit::new(DURATION, 0);
+            limit.begin(FIRST, now_ns);
+            limit
+        };
+        let late = read_at(BEGIN_NS + SECOND_NS / 5);
+        assert!(late.is_reached(Some(&at(1300)), END_NS));
+        assert!(!late.is_reached(Some(&at(1299)), END_NS));
+        // The clock of another host.
+        let now_ns = 1000 * SECOND_NS;
+        let other = read_at(now_ns);
+        assert!(!other.is_reached(Some(&at(1299)), now_ns + 5 * SECOND_NS));
+        assert!(other.is_reached(Some(&at(1300)), now_ns + 5 * SECOND_NS));
     }
 
     #[test]

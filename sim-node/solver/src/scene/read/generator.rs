@@ -57,7 +57,7 @@ static SHAPES: [ShapeKeys; 7] = [
     ShapeKeys { name: "ragdoll", keys: &["origin", "height"], pins: &ragdoll::PIN_WORDS },
     ShapeKeys {
         name: "obj",
-        keys: &["path", "density", "vertices", "faces", "bending", "rest"],
+        keys: &["path", "scale", "density", "vertices", "faces", "bending", "rest"],
         pins: &["none"],
     },
 ];

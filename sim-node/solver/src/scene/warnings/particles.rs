@@ -2,6 +2,7 @@
 
 use crate::contacts::obstacle::depth_at_load;
 use crate::scene::definition::Scene;
+use crate::scene::generate::Shape;
 use crate::scene::model::Model;
 
 /// Distance from the scene's origin, in m, beyond which f32 positions make a scene at rest jitter.
@@ -22,10 +23,17 @@ pub(super) fn far_from_origin(scene: &Scene, model: &Model) -> Option<String> {
     let [x, y, z] = scene.gravity;
     let unit_scale = (x * x + y * y + z * z).sqrt() / GRAVITY;
     let near = NEAR_ORIGIN * if unit_scale > 1.0 { unit_scale } else { 1.0 };
+    let has_mesh = scene.generators.iter().any(|one| matches!(one.shape, Shape::Obj(_)));
+    let cure = if has_mesh {
+        "give a mesh in another unit a `scale`, such as 0.01 for centimetres, and put the distance of a mesh in \
+         the scene's unit into `origin`"
+    } else {
+        "put the distance into `origin`"
+    };
     (farthest > near).then(|| {
         format!(
             "a coordinate reaches {farthest} {unit} from the origin: beyond {near:.0} {unit} a \
-             scene at rest jitters; put the distance into `origin`",
+             scene at rest jitters; {cure}",
             unit = scene.unit
         )
     })

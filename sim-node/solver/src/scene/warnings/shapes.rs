@@ -26,7 +26,24 @@ pub(super) fn without_pins(scene: &Scene) -> Vec<String> {
     let generators = scene.generators.iter().enumerate().filter(|(_, one)| matches_none(one));
     let anchors = scene.anchors.iter().enumerate().filter(|(_, one)| one.particles.is_empty());
     generators
-        .map(|(index, _)| format!("generate[{index}].pinned matches no particle of the shape"))
+        .map(|(index, one)| {
+            let extent = extent(&one.shape);
+            format!("generate[{index}].pinned matches no particle of the shape{extent}")
+        })
         .chain(anchors.map(|(index, _)| format!("anchor[{index}].particles is empty")))
         .collect()
+}
+
+/// Returns the coordinates of a mesh on each axis in parentheses, because its pins are compared with them.
+fn extent(shape: &Shape) -> String {
+    let Shape::Obj(mesh) = shape else { return String::new() };
+    let range = |axis: usize| {
+        let mut values: Vec<_> = mesh.vertices.iter().map(|vertex| vertex[axis]).collect();
+        values.sort_unstable_by(f32::total_cmp);
+        let (Some(least), Some(most)) = (values.first(), values.last()) else {
+            return String::new();
+        };
+        format!("{} {least} to {most}", ["x", "y", "z"][axis])
+    };
+    format!(" ({})", [0, 1, 2].map(range).join(", "))
 }

@@ -43,6 +43,7 @@ pub(in crate::scene::read) struct FileGenerator {
     pub(in crate::scene::read) width: Option<Number>,
     pub(in crate::scene::read) height: Option<Number>,
     pub(in crate::scene::read) path: Option<Word>,
+    pub(in crate::scene::read) scale: Option<Number>,
     pub(in crate::scene::read) density: Option<Number>,
     pub(in crate::scene::read) vertices: Option<Spanned<Vec<Vector>>>,
     pub(in crate::scene::read) faces: Option<Spanned<Vec<Vec<i64>>>>,
@@ -110,7 +111,7 @@ impl FileGenerator {
     }
 
     /// Returns the places of the keys that belong to single shapes.
-    pub(in crate::scene::read) fn shape_keys(&self) -> [(&'static str, Option<Range<usize>>); 26] {
+    pub(in crate::scene::read) fn shape_keys(&self) -> [(&'static str, Option<Range<usize>>); 27] {
         fn span<T>(value: Option<&Spanned<T>>) -> Option<Range<usize>> {
             value.map(Spanned::span)
         }
@@ -138,6 +139,7 @@ impl FileGenerator {
             ("width", span(self.width.as_ref())),
             ("height", span(self.height.as_ref())),
             ("path", span(self.path.as_ref())),
+            ("scale", span(self.scale.as_ref())),
             ("density", span(self.density.as_ref())),
             ("vertices", span(self.vertices.as_ref())),
             ("faces", span(self.faces.as_ref())),

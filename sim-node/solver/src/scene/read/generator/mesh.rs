@@ -6,6 +6,7 @@ use super::fields::GeneratorFields;
 use super::file::FilePinned;
 
 use super::super::mesh::MeshKeys;
+use super::super::reader::SIZE;
 use crate::scene::error::SceneError;
 use crate::scene::generate::obj::Obj;
 use crate::scene::generate::pinned::Pinned;
@@ -24,6 +25,7 @@ impl GeneratorFields<'_, '_> {
             field: &|key| self.name(key),
             parse: Mesh::from_obj,
         })?;
+        let mesh = self.scaled(mesh)?;
         let density = file
             .density
             .as_ref()
@@ -37,6 +39,22 @@ impl GeneratorFields<'_, '_> {
             contact: self.file.contact.unwrap_or(true),
             softness: self.softness()?,
         })
+    }
+
+    /// Multiplies the vertices by the key `scale`.
+    fn scaled(&self, mut mesh: Mesh) -> Result<Mesh, SceneError> {
+        let Some(number) = &self.file.scale else { return Ok(mesh) };
+        let field = self.name("scale");
+        let scale = self.reader.ranged(&field, number, SIZE)?;
+        for axis in mesh.vertices.as_flattened_mut() {
+            *axis *= scale;
+            if !NumberRange::COORDINATE.contains(*axis) {
+                let problem =
+                    format!("a vertex is at {axis} (allowed: {})", NumberRange::COORDINATE.text);
+                return self.reader.error(number.span(), &field, problem);
+            }
+        }
+        Ok(mesh)
     }
 
     fn pinned_vertices(&self, mesh: &Mesh) -> Result<Pinned, SceneError> {
