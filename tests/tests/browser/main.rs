@@ -21,10 +21,11 @@ mod replay;
 mod support;
 mod time;
 
-/// Recordings and pictures of the page.
+/// Recordings, pictures and videos of the page.
 mod save {
     mod files;
     mod recording;
+    mod video;
 }
 
 /// Looks back, and changes that are undone.

@@ -18,6 +18,7 @@ import { Overlay } from "./ui/overlay.js";
 import { Inspector } from "./panel/inspector.js";
 import { PictureButton } from "./save/picture.js";
 import { RecordingControl } from "./save/recording.js";
+import { Video } from "./save/video.js";
 import { Panel } from "./panel/panel.js";
 import { Connector } from "./net/socket.js";
 import { Selection } from "./state/selection.js";
@@ -120,6 +121,7 @@ function start(renderer) {
   const composition = new Composition(app, overlay.canvas, [colorLegend, forceLegend]);
   const picture = new PictureButton(renderer, composition, banner);
   controls.onPicture = () => picture.save();
+  const video = new Video(renderer, composition, banner);
   new RecordingControl(app, token);
   const wishes = new Wishes(simulation, commands, {
     forces: () => renderer.toggles.forces || inspector.wantsForces(),
@@ -145,10 +147,12 @@ function start(renderer) {
     forceLegend.tick();
     wishes.tick();
     renderer.resize();
+    video.request(nowMs);
     const between = performance.now();
     if (renderer.isDirty) renderer.draw();
     const drawn = performance.now();
     overlay.draw();
+    video.add(nowMs);
     if (simulation.frameNumber !== null) connector.acknowledge(simulation.frameNumber);
     simulation.frameNumber = null;
     scriptMs += 0.05 * (between - begin + performance.now() - drawn - scriptMs);

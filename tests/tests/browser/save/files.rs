@@ -5,13 +5,13 @@ use serde_json::{Value, json};
 use crate::support::{Rig, Tab};
 
 /// Keeps what the page saves instead of downloading it.
-const KEEP_FILES: &str = "void (() => { window.saved = []; const make = URL.createObjectURL; \
+pub(super) const KEEP_FILES: &str = "void (() => { window.saved = []; const make = URL.createObjectURL; \
     URL.createObjectURL = (blob) => { saved.push({ blob }); return make.call(URL, blob); }; \
     HTMLAnchorElement.prototype.click = function () { saved.at(-1).name = this.download; }; })()";
 
 /// Decodes an image: its size, and functions that count and find colours in it, in pixels from its lower right
 /// corner.
-const LOOK: &str = "const look = (image, width, height, near) => { \
+pub(super) const LOOK: &str = "const look = (image, width, height, near) => { \
     const canvas = new OffscreenCanvas(width, height); \
     const context = canvas.getContext('2d'); \
     context.drawImage(image, 0, 0, width, height); \
@@ -23,7 +23,7 @@ const LOOK: &str = "const look = (image, width, height, near) => { \
     return { width, height, data, find }; };";
 
 /// The colours at both ends of the ramp.
-const RAMP: [&str; 2] = ["#0b2f6b", "#fde737"];
+pub(super) const RAMP: [&str; 2] = ["#0b2f6b", "#fde737"];
 
 /// The picture that the page has saved.
 struct Saved {
@@ -41,7 +41,7 @@ struct Saved {
 }
 
 /// Shows the colours of a paused curtain.
-fn coloured(fragment: &str) -> Rig {
+pub(super) fn coloured(fragment: &str) -> Rig {
     let mut rig = Rig::new(&["curtain"], fragment);
     rig.tab.wait("viewer.step > 60");
     rig.pause();
@@ -87,7 +87,7 @@ fn save(tab: &Tab, [surface, text]: [&str; 2]) -> Saved {
     }
 }
 
-fn size(tab: &Tab) -> [f64; 2] {
+pub(super) fn size(tab: &Tab) -> [f64; 2] {
     ["width", "height"].map(|side| {
         tab.number(&format!(
             "document.querySelector('#picture-canvas').getBoundingClientRect().{side}"

@@ -52,6 +52,8 @@ pub(super) const FILES: &[(&str, &[u8])] = files![
     "js/save/picture.js",
     "js/save/recording-text.js",
     "js/save/recording.js",
+    "js/save/video-format.js",
+    "js/save/video.js",
     "js/state/emitter.js",
     "js/state/forces.js",
     "js/state/framing.js",
