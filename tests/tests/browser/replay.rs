@@ -65,6 +65,27 @@ fn scrubbing_a_recording_shows_the_recorded_positions() {
 
 #[test]
 #[ignore = "needs Chromium"]
+fn the_page_says_that_a_recording_is_truncated_until_a_live_bridge_takes_its_address() {
+    let sandbox = Sandbox::new();
+    let whole = sandbox.path("whole.mcap");
+    let args = ["simulate", "curtain", "--steps", "960", "-o", &whole];
+    Process::run(Program::Recorder, &sandbox, &args).success();
+    let bytes = std::fs::read(&whole).unwrap();
+    let file = sandbox.path("run.mcap");
+    std::fs::write(&file, &bytes[..bytes.len() * 6 / 10]).unwrap();
+    let mut replay = ReplayRig::open(sandbox, &file, "");
+    replay.tab.wait(
+        "/^The recording is truncated after byte \\d+; shown up to step \\d+\\. \
+         `recorder repair run\\.mcap OUT\\.mcap` copies what is intact\\.$/.test(viewer.banner)",
+    );
+    replay.tab.wait("document.querySelector('#banner').checkVisibility()");
+    replay.end();
+    replay.go_live("curtain");
+    replay.tab.wait("viewer.mode === 'live' && viewer.step > 0 && viewer.banner === ''");
+}
+
+#[test]
+#[ignore = "needs Chromium"]
 fn a_live_bridge_at_the_address_of_a_replay_shows_its_own_timeline() {
     let sandbox = Sandbox::new();
     let file = sandbox.path("run.mcap");

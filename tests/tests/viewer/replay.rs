@@ -170,6 +170,7 @@ fn the_timeline_has_marks_and_the_result_of_the_hash_check() {
     assert_eq!((&timeline["file"], &timeline["scene"]), (&json!("run.mcap"), &json!("curtain")));
     assert_eq!((&timeline["first_step"], &timeline["last_step"]), (&json!(0), &json!(STEPS)));
     assert_eq!((&timeline["rate_hz"], &timeline["last_time_s"]), (&json!(240), &json!(4.0)));
+    assert_eq!(timeline["incomplete"], "");
     let mark =
         |kind: &str, step: u64, count: u32| json!({ "kind": kind, "step": step, "count": count });
     let marks = [
@@ -354,6 +355,12 @@ fn a_truncated_recording_is_shown_as_far_as_it_goes() {
     assert_eq!(timeline["last_step"], states.last().unwrap().step);
     let text = timeline["hash_text"].as_str().unwrap();
     assert!(text.contains("truncated"), "{text}");
+    let incomplete = timeline["incomplete"].as_str().unwrap();
+    let last = states.last().unwrap().step;
+    assert!(incomplete.starts_with("truncated after byte "), "{incomplete}");
+    assert!(incomplete.contains(&format!("; shown up to step {last}.")), "{incomplete}");
+    // The page needs no paths of the host.
+    assert!(incomplete.contains("`recorder repair cut.mcap OUT.mcap`"), "{incomplete}");
 }
 
 #[test]

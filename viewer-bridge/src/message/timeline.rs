@@ -26,6 +26,8 @@ pub struct Timeline {
     pub hashes: Hashes,
     /// The same for the user.
     pub hash_text: String,
+    /// The place where the file ends, and the remedy, for the user; empty if it is complete.
+    pub incomplete: String,
 }
 
 /// Events of one kind at a place on the timeline.

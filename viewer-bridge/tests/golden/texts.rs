@@ -106,6 +106,9 @@ fn to_page_of_a_replay() -> Vec<ToPage> {
                 .to_vec(),
             hashes: Hashes::Checking,
             hash_text: "checking hashes".to_owned(),
+            incomplete: "truncated after byte 4096; shown up to step 2400. \
+                `recorder repair run.mcap OUT.mcap` copies what is intact"
+                .to_owned(),
         })),
         ToPage::Playback(Playback {
             is_playing: true,

@@ -168,6 +168,8 @@ function listenToSimulation(input) {
   simulation.on("outcome", (outcome) => input.app.commands.receive(outcome));
   simulation.on("notice", ({ text, level }) => banner.notify(text, level));
   simulation.on("node", (node) => banner.set("node", node.state === "alive" || simulation.isReplay ? "" : sentence(node.text || "no node is running")));
+  // A live bridge at the same address has no recording.
+  simulation.on("timeline", (timeline) => banner.set("incomplete", timeline?.incomplete ? sentence(`the recording is ${timeline.incomplete}`) : ""));
   simulation.on("scene", (scene) => { document.title = `${scene.name} · Catenary`; });
   simulation.on("frame", warnOfParticles);
   simulation.on("stats", warnOfParticles);

@@ -59,18 +59,26 @@ pub(super) fn open(
     };
     let mut tape =
         Tape::open(path, Some(stop), &mut on_walk).map_err(|error| with_remedy(path, error))?;
-    if *tape.log().end() != LogEnd::Complete {
-        let (end, last) = (tape.log().end(), tape.last_step());
-        let path = path.display();
-        note(&format!(
-            "warning: {path} is {end}; shown up to step {last}. `recorder repair {path} OUT.mcap` copies \
-             what is intact"
-        ));
+    let shown_path = path.display().to_string();
+    let incomplete = incomplete(&tape, &shown_path);
+    if !incomplete.is_empty() {
+        note(&format!("warning: {shown_path} is {incomplete}"));
     }
     let load = load_of(&tape)?;
     let first = tape.state_at(tape.first_step()).map_err(|error| with_remedy(path, error))?;
     let name = path.file_name().unwrap_or(path.as_os_str());
     Ok(Recording { tape, load, first, file: name.to_string_lossy().into_owned() })
+}
+
+/// Says where a file ends that lacks its end, and how to keep the rest of it. Empty if it is complete.
+pub(super) fn incomplete(tape: &Tape, file: &str) -> String {
+    match tape.log().end() {
+        LogEnd::Complete => String::new(),
+        end => format!(
+            "{end}; shown up to step {}. `recorder repair {file} OUT.mcap` copies what is intact",
+            tape.last_step()
+        ),
+    }
 }
 
 /// Adds the remedy to an error.

@@ -1,7 +1,7 @@
 //! Messages about the recording and its playback.
 
 use super::check::Report;
-use super::open::Recording;
+use super::open::{Recording, incomplete};
 use super::playhead::Playhead;
 use crate::message::{Node, NodeState, Playback, Timeline};
 
@@ -19,6 +19,7 @@ pub(super) fn timeline(recording: &Recording, report: &Report) -> Timeline {
         marks: report.marks.clone(),
         hashes: report.hashes,
         hash_text: report.hash_text.clone(),
+        incomplete: incomplete(tape, &recording.file),
     }
 }
 

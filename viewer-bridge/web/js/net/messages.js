@@ -18,7 +18,7 @@
  * @typedef {{ kind: "tear" | "pin" | "command" | "late", step: number, count: number }} Mark
  * @typedef {{
  *   type: "timeline", file: string, scene: string, rate_hz: number, first_step: number, last_step: number,
- *   first_time_s: number, last_time_s: number, marks: Mark[], hashes: string, hash_text: string,
+ *   first_time_s: number, last_time_s: number, marks: Mark[], hashes: string, hash_text: string, incomplete: string,
  * }} TimelineMessage
  * @typedef {{ type: "playback", is_playing: boolean, rate: number, is_looping: boolean, step: number, time_s: number }} Playback
  * @typedef {{ type: "history", first_step: number | null, marks: Mark[], text: string }} HistoryMessage
