@@ -107,6 +107,43 @@ fn a_recording_is_complete_when_the_bridge_ends_and_when_it_is_killed() {
 }
 
 #[test]
+fn ctrl_c_ends_the_recording_once_although_it_reaches_a_whole_group_of_processes() {
+    let sandbox = Sandbox::new();
+    let _node = start_node(&sandbox);
+    let program = Program::ViewerBridge.path().display().to_string();
+    let runs = sandbox.path("runs");
+    // A terminal sends Ctrl-C to the group of the bridge. A second signal would end the recorder at once.
+    let script = r#"set -m; trap 'kill -INT -- -$!' USR1; "$0" --listen 127.0.0.1:0 --recordings "$1" & wait; wait"#;
+    let bridge = Process::start(Program::Bash, &sandbox, &["-c", script, &program, &runs]);
+    let bridge = Bridge::ready(bridge);
+    let path = record(&mut bridge.page());
+    bridge.process.signal(Signal::USR1);
+    let ended = bridge.process.wait();
+    assert!(Path::new(&path).exists(), "{}", ended.stderr);
+    assert_eq!(stop_reason(&sandbox, &path), "signal");
+    verify(&sandbox, &path);
+}
+
+#[test]
+fn a_recording_that_is_stopped_at_once_is_complete_with_and_without_a_step() {
+    for args in [&["run", "curtain"][..], &["run", "curtain", "--paused"]] {
+        let sandbox = Sandbox::new();
+        let _node = Process::start_ready(Program::SimNode, &sandbox, args);
+        let bridge = start_bridge(&sandbox);
+        let mut page = bridge.page();
+        page.text_with("node", "state", &json!("alive"));
+        page.send(&json!({ "type": "record" }));
+        // The recorder does not handle signals yet.
+        page.send(&json!({ "type": "stop_recording" }));
+        in_state(&mut page, "finishing");
+        let ended = state(&mut page, |text| text["state"] != "finishing");
+        assert_eq!((&ended["state"], &ended["text"]), (&json!("finished"), &json!("")), "{ended}");
+        let path = ended["path"].as_str().unwrap();
+        assert_eq!(stop_reason(&sandbox, path), "signal");
+    }
+}
+
+#[test]
 fn a_recording_ends_with_its_scene_and_with_its_node_and_says_so() {
     let sandbox = Sandbox::new();
     let node = start_node(&sandbox);
