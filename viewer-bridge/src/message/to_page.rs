@@ -212,7 +212,8 @@ pub struct OutcomeText {
     pub reason: Option<Refusal>,
     /// A sentence for the user, or "".
     pub text: String,
-    /// Step whose state is shown or put in place, for `look` and `rewind`.
+    /// Step whose state is shown or put in place. Only the answers to `look`, `rewind` and `undo` have it.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub state_step: Option<u64>,
 }
 

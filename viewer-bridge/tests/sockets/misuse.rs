@@ -89,7 +89,7 @@ fn a_value_out_of_range_is_rejected_and_the_page_stays_connected() {
     assert_eq!(
         outcome,
         json!({
-            "type": "outcome", "id": 5, "kind": "grab", "status": "rejected", "step": null, "state_step": null,
+            "type": "outcome", "id": 5, "kind": "grab", "status": "rejected", "step": null,
             "applied": 0, "rejected": 1, "reason": "out_of_range",
             "text": "a value is out of its range",
         })

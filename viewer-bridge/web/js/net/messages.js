@@ -14,7 +14,7 @@
  * }} NodeState
  * @typedef {Record<string, ParameterValue | Record<string, ParameterValue>>} Values
  * @typedef {{ type: "parameters", is_complete: boolean, values: Values | null, initial: Values | null }} Parameters
- * @typedef {{ type: "outcome", id: number | null, kind: string, status: "applied" | "rejected" | "unanswered", step: number | null, applied: number, rejected: number, reason: string, text: string, state_step: number | null }} OutcomeMessage
+ * @typedef {{ type: "outcome", id: number | null, kind: string, status: "applied" | "rejected" | "unanswered", step: number | null, applied: number, rejected: number, reason: string, text: string, state_step?: number }} OutcomeMessage
  * @typedef {{ kind: "tear" | "pin" | "command" | "late", step: number, count: number }} Mark
  * @typedef {{
  *   type: "timeline", file: string, scene: string, rate_hz: number, first_step: number, last_step: number,

@@ -15,7 +15,7 @@ export function rangeOfLast(first, last, seconds, rateHz) {
 
 /** Text for the user after the page has gone on from an earlier state. @param {number} step the state that it showed @param {Outcome} outcome @param {number} rateHz */
 export function goneOnText(step, { state_step }, rateHz) {
-  if (state_step === null || state_step === step) return { text: `The simulation goes on from ${clockText(step / rateHz)}.`, level: "info" };
+  if (state_step === undefined || state_step === step) return { text: `The simulation goes on from ${clockText(step / rateHz)}.`, level: "info" };
   const earlier = ((step - state_step) / rateHz).toPrecision(2);
   return {
     text: `The node no longer keeps step ${step}. It goes on from step ${state_step}, ${earlier} s earlier. (sim-node run --history keeps more.)`,
@@ -91,7 +91,7 @@ export class LiveTrack {
     if (simulation.frame === null || (count > 0 && !simulation.isLookingBack)) return;
     const step = Math.max(0, simulation.frame.step + count);
     this.commands.run("look", { step, toward: count < 0 ? "before" : "after" }, ({ state_step }) => {
-      if (count > 0 && state_step !== null && state_step >= (simulation.present?.step ?? 0)) simulation.returnToPresent();
+      if (count > 0 && state_step !== undefined && state_step >= (simulation.present?.step ?? 0)) simulation.returnToPresent();
     });
   }
 
