@@ -157,8 +157,8 @@ fn pages_can_pin_cut_brush_set_step_reset_and_load() {
     );
     assert_eq!(page.rejected(json!({ "type": "step" })), "no_effect_here");
     let paused_before = page.applied(json!({ "type": "pause" }));
-    page.applied(json!({ "type": "step", "count": 3 }));
-    page.frame(|frame| frame.head.stamp.step == paused_before + 2);
+    let last = paused_before + 2;
+    page.frame_after(json!({ "type": "step", "count": 3 }), |frame| frame.head.stamp.step == last);
     page.applied(json!({ "type": "resume" }));
     let reset = page.applied(json!({ "type": "reset" }));
     let tear = page.tear();

@@ -187,13 +187,31 @@ impl Page {
         })
     }
 
-    /// Sends a command and returns its outcome.
-    pub(crate) fn command(&mut self, mut message: Value) -> Value {
-        self.last_id += 1;
-        let id = json!(self.last_id);
-        message["id"] = id.clone();
-        self.send(&message);
+    /// Sends a command and returns its outcome. Drops the frames before the outcome.
+    pub(crate) fn command(&mut self, message: Value) -> Value {
+        let id = self.send_with_id(message);
         self.text_with("outcome", "id", &id)
+    }
+
+    /// Sends a command that must be applied, and returns a frame that matches. The frame can come before
+    /// the outcome, and no other may follow it.
+    pub(crate) fn frame_after(
+        &mut self,
+        message: Value,
+        matches: impl Fn(&Frame) -> bool,
+    ) -> Frame {
+        let id = self.send_with_id(message);
+        let frame = self.frame(matches);
+        let outcome = self.text_with("outcome", "id", &id);
+        assert_eq!(outcome["status"], "applied", "{outcome}");
+        frame
+    }
+
+    fn send_with_id(&mut self, mut message: Value) -> Value {
+        self.last_id += 1;
+        message["id"] = json!(self.last_id);
+        self.send(&message);
+        message["id"].take()
     }
 
     /// Sends a command that must be applied, and returns the step that shows it.

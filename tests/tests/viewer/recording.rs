@@ -73,8 +73,9 @@ fn a_recording_of_a_page_is_shown_to_all_pages_verifies_and_opens_in_a_page_of_i
     assert_eq!(replay.hello["mode"], "replay");
     assert_eq!(replay.scene().text.name, "curtain");
     let timeline = bridge.page_at(&socket).text(|text| text["type"] == "timeline");
-    replay.command(json!({ "type": "seek", "step": timeline["last_step"] }));
-    replay.frame(|frame| timeline["last_step"] == frame.head.stamp.step);
+    replay.frame_after(json!({ "type": "seek", "step": timeline["last_step"] }), |frame| {
+        timeline["last_step"] == frame.head.stamp.step
+    });
     assert_eq!(replay.rejected(json!({ "type": "record" })), "only_live");
     // The live pages go on, and the next recording has another file.
     let shown = page.frame(|_| true).head.stamp.step;
