@@ -56,9 +56,9 @@ impl Bridge {
         page
     }
 
-    /// Opens the page of a socket of a bridge that demands a token.
-    pub(crate) fn page_with_token(&self, path: &str, token: &str) -> Page {
-        let mut page = self.greet(path, &json!({ "token": token }));
+    /// Opens the page of a socket with further fields of `hello`.
+    pub(crate) fn page_with(&self, path: &str, fields: &Value) -> Page {
+        let mut page = self.greet(path, fields);
         page.hello = page.text(|text| text["type"] == "hello");
         page
     }

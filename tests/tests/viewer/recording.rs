@@ -226,7 +226,7 @@ fn other_machines_record_only_into_a_chosen_folder_and_open_only_its_recordings(
         let args = [&["--listen", "0.0.0.0:0"], args].concat();
         let bridge = Bridge::ready(Process::start(Program::ViewerBridge, &sandbox, &args));
         let (_, token) = bridge.host.split_once("#token=").unwrap();
-        let mut page = bridge.page_with_token("/socket", token);
+        let mut page = bridge.page_with("/socket", &json!({ "token": token }));
         let shown = in_state(&mut page, state_name);
         if state_name == "unavailable" {
             assert!(shown["text"].as_str().unwrap().contains("--recordings DIR"), "{shown}");

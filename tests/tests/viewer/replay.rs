@@ -8,6 +8,7 @@ use integration_tests::{Process, Program, Sandbox, ctl, record};
 use recorder::{Frame, FrameReader, LogReader, Message as Logged, RunDescription};
 use serde_json::{Value, json};
 use sim_contract::ParticleFlags;
+use viewer_bridge::wire::frame_flag::PAUSED;
 use viewer_bridge::wire::{FlaggedParticle, Message};
 
 use super::page::{Bridge, Page};
@@ -264,6 +265,34 @@ fn pages_play_pause_step_and_loop_one_recording_together() {
     page.frame(|frame| frame.head.stamp.step < STEPS / 2);
     let step = page.applied(json!({ "type": "pause" }));
     other.frame(|frame| frame.head.stamp.step == step);
+}
+
+#[test]
+fn a_paused_replay_shows_exactly_what_was_recorded_at_every_size() {
+    let sandbox = Sandbox::new();
+    // Large enough that pages receive rounded positions while it moves.
+    let sheet = "version = 1\n[[generate]]\nshape = \"cloth\"\ncolumns = 80\nrows = 60\nspacing = 0.05\n\
+        origin = [0, 3, 0]\nright = [1, 0, 0]\ndown = [0, -1, 0]\npinned = \"top\"\n";
+    let (scene, file) = (sandbox.write("sheet.toml", sheet), sandbox.path("run.mcap"));
+    let args = ["simulate", &scene, "--steps", "120", "-o", &file];
+    Process::run(Program::Recorder, &sandbox, &args).success();
+    let (states, _) = states(&file);
+    let bridge = Bridge::start_with(&sandbox, &["--replay", &file]);
+    let page = bridge.page_with("/socket", &json!({ "format": "auto" }));
+    let mut view = View { page, torn: Vec::new(), pins: Vec::new() };
+    assert_eq!(view.shown(|_| true), states[0]);
+    assert_eq!(view.seek(60), states[60]);
+    // While it plays, the positions are rounded. The state at which it stops is exact again.
+    let mut page = view.page;
+    page.send(&json!({ "type": "loop", "is_on": true }));
+    let playing =
+        page.frame_after(json!({ "type": "resume" }), |frame| frame.head.flags & PAUSED == 0);
+    let place = usize::try_from(playing.head.stamp.step).unwrap();
+    assert_ne!(playing.positions, states[place].positions);
+    let stopped =
+        page.frame_after(json!({ "type": "pause" }), |frame| frame.head.flags & PAUSED != 0);
+    let place = usize::try_from(stopped.head.stamp.step).unwrap();
+    assert_eq!(stopped.positions, states[place].positions);
 }
 
 #[test]

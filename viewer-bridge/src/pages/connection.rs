@@ -8,7 +8,7 @@ use axum::extract::ws::Message;
 use bytes::Bytes;
 use tokio::sync::{mpsc, watch};
 
-use super::frame_set::{FrameSet, format_for};
+use super::frame_set::FrameSet;
 use crate::limits::FRAMES_UNACKNOWLEDGED_MAX;
 use crate::message::Choice;
 use crate::request::ClientId;
@@ -98,7 +98,7 @@ impl Connection {
     /// Returns the newest frame for the page. Reports a missed frame once.
     pub(crate) fn next_frame(&mut self) -> NextFrame {
         let frame = Arc::clone(&self.frames.borrow_and_update());
-        let encoded = match format_for(self.choice, frame.particle_count) {
+        let encoded = match frame.traits.format_for(self.choice) {
             Format::F32 => &frame.f32,
             Format::U16 => &frame.u16,
         };

@@ -4,15 +4,16 @@ use bytes::Bytes;
 
 use crate::limits::F32_PARTICLES_MAX;
 use crate::message::Choice;
-use crate::wire::Format;
+use crate::sink::State;
+use crate::wire::{Format, frame_flag};
 
 /// The newest state, in every format that a page waited for.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct FrameSet {
     /// Number of the frame; ascending.
     pub(crate) number: u32,
-    /// Number of particles.
-    pub(crate) particle_count: usize,
+    /// What decides the format of each page.
+    pub(crate) traits: Traits,
     /// FRAME f32.
     pub(crate) f32: Option<Bytes>,
     /// FRAME u16.
@@ -69,11 +70,28 @@ impl Formats {
     }
 }
 
-/// The format in which a page receives a scene of this many particles.
-pub(super) fn format_for(choice: Choice, particle_count: usize) -> Format {
-    match choice {
-        Choice::F32 => Format::F32,
-        Choice::Auto if particle_count <= F32_PARTICLES_MAX => Format::F32,
-        Choice::Auto | Choice::U16 => Format::U16,
+/// What decides the format in which a page receives a state.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Traits {
+    /// Number of particles.
+    pub(crate) particle_count: usize,
+    /// Nothing moves until the next command.
+    pub(crate) is_paused: bool,
+}
+
+impl Traits {
+    pub(super) fn of(state: &State<'_>) -> Self {
+        let is_paused = state.flags & frame_flag::PAUSED != 0;
+        Self { particle_count: state.particles.len(), is_paused }
+    }
+
+    /// The format for a page. Exact positions are worth their size while they stay on show.
+    pub(super) fn format_for(self, choice: Choice) -> Format {
+        let is_exact = self.is_paused || self.particle_count <= F32_PARTICLES_MAX;
+        match choice {
+            Choice::F32 => Format::F32,
+            Choice::Auto if is_exact => Format::F32,
+            Choice::Auto | Choice::U16 => Format::U16,
+        }
     }
 }

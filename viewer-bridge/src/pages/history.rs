@@ -7,7 +7,7 @@ use bytes::Bytes;
 use recorder::OutcomeRow;
 
 use super::connection::Wishes;
-use super::frame_set::{FrameSet, format_for};
+use super::frame_set::FrameSet;
 use crate::limits::{HISTORY_MARKS_MAX, HISTORY_SIZE_BYTES_MAX, HISTORY_STATES_MAX};
 use crate::message::{Choice, HistoryText, Mark, MarkKind, Toward};
 use crate::wire::{Format, Past, Pins, Stamp, Tear};
@@ -197,7 +197,7 @@ impl PastState {
         let tear = around.tear.clone().unwrap_or_else(nothing);
         let pins = around.pins.clone().unwrap_or_else(free);
         let colliders = frame.colliders.as_ref().map(|colliders| colliders.bytes.clone());
-        let (wanted, other) = match format_for(page.choice, frame.particle_count) {
+        let (wanted, other) = match frame.traits.format_for(page.choice) {
             Format::F32 => (&frame.f32, &frame.u16),
             Format::U16 => (&frame.u16, &frame.f32),
         };
@@ -226,7 +226,7 @@ mod tests {
     fn frame(step: u64, size_bytes: usize) -> Arc<FrameSet> {
         let number = u32::try_from(step).unwrap();
         let f32 = Some(Bytes::from(vec![0; size_bytes]));
-        Arc::new(FrameSet { number, particle_count: 1, f32, ..FrameSet::default() })
+        Arc::new(FrameSet { number, f32, ..FrameSet::default() })
     }
 
     fn stamp(step: u64) -> Stamp {

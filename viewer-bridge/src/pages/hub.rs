@@ -16,7 +16,7 @@ use tokio::sync::{mpsc, watch};
 use super::connection::{Connection, Credit, SentFrames, Wishes};
 use super::frame_encoder::{FrameEncoder, Wanted};
 pub use super::frame_set::Formats;
-use super::frame_set::{FrameSet, format_for};
+use super::frame_set::{FrameSet, Traits};
 use super::history::{History, PastMessages, Viewer};
 use crate::limits::{PROTOCOL, RELIABLE_QUEUED_MAX};
 use crate::message::{
@@ -122,11 +122,12 @@ impl Hub {
         }
     }
 
-    /// Returns the formats that pages with credit wait for, in a scene of this many particles.
-    pub fn awaited_formats(&self, particle_count: usize) -> Formats {
+    /// Returns the formats in which pages with credit wait for this state.
+    pub fn awaited_formats(&self, state: &State<'_>) -> Formats {
+        let traits = Traits::of(state);
         let mut formats = Formats::default();
         for page in lock(&self.state).pages.values().filter(|page| page.credit.is_left()) {
-            formats.add(format_for(page.choice, particle_count));
+            formats.add(traits.format_for(page.choice));
         }
         formats
     }
@@ -179,7 +180,7 @@ impl Hub {
 
     /// Encodes a state in the formats that pages wait for, and keeps it for those that look back.
     fn publish_state(&self, state: &State<'_>) {
-        let formats = self.awaited_formats(state.particles.len());
+        let formats = self.awaited_formats(state);
         if !formats.is_any() {
             return;
         }

@@ -19,7 +19,7 @@ pub enum Format {
 
 /// The bits of a frame's flags.
 pub mod frame_flag {
-    /// The node was paused when it made the step.
+    /// The node was paused when it made the step, or the replay is paused.
     pub const PAUSED: u32 = 1;
     /// A recording is on show.
     pub const REPLAY: u32 = 1 << 1;

@@ -9,7 +9,7 @@ use viewer_bridge::pages::hub::Formats;
 use viewer_bridge::request::{ClientId, Request, RequestKind};
 use viewer_bridge::sink::Update;
 use viewer_bridge::wire::Format::{F32, U16};
-use viewer_bridge::wire::Message;
+use viewer_bridge::wire::{Message, frame_flag};
 
 use crate::support::{Site, wait_for};
 
@@ -73,13 +73,13 @@ fn a_page_receives_two_frames_and_then_the_newest_after_an_acknowledgement() {
     site.show(2, 1);
     assert_eq!((first.0, page.frame().0), (1, 2));
     // The credit is used up: of the following frames, only the last one waits.
-    assert_eq!(site.hub.awaited_formats(1), Formats::default());
+    assert_eq!(site.awaited_formats(1), Formats::default());
     for step in 3..50 {
         site.show(step, 1);
     }
     page.send(&ack(first.1));
     // The page has credit again: the source learns of the demand, and shows its newest frame.
-    wait_for("demand", || site.hub.awaited_formats(1).is_any().then_some(()));
+    wait_for("demand", || site.awaited_formats(1).is_any().then_some(()));
     site.show(50, 1);
     assert_eq!(page.frame().0, 50);
 }
@@ -155,7 +155,7 @@ fn a_slow_page_is_never_more_than_three_frames_behind() {
         page.send(&ack(number));
         // A frame that was encoded just before the page ran out of credit uses the new credit at once.
         wait_for("credit, or the frame that uses it", || {
-            (site.hub.awaited_formats(1).is_any() || page.has_arrivals()).then_some(())
+            (site.awaited_formats(1).is_any() || page.has_arrivals()).then_some(())
         });
     }
 }
@@ -199,8 +199,10 @@ fn each_page_receives_its_requested_format() {
         pages.push(page);
     }
     site.begin(1);
-    for (step, count) in [(1, 10), (2, 5000)] {
-        site.show(step, count);
+    // Exact positions are worth their size while nothing moves.
+    let paused = frame_flag::PAUSED;
+    for (step, count, flags) in [(1, 10, 0), (2, 5000, 0), (2, 5000, paused), (3, 5000, 0)] {
+        site.show_with(step, count, flags);
         for page in &mut pages {
             loop {
                 if let Message::Frame(frame) = page.binary() {
@@ -211,20 +213,20 @@ fn each_page_receives_its_requested_format() {
             }
         }
     }
-    assert_eq!(kinds, [F32, F32, U16, U16, F32, U16]);
+    assert_eq!(kinds, [F32, F32, U16, U16, F32, U16, F32, F32, U16, U16, F32, U16]);
 }
 
 #[test]
 fn there_is_no_demand_without_pages() {
     let mut site = Site::start();
-    assert_eq!(site.hub.awaited_formats(10), Formats::default());
+    assert_eq!(site.awaited_formats(10), Formats::default());
     let page = site.page();
-    assert_eq!(site.hub.awaited_formats(10), Formats { f32: true, ..Formats::default() });
-    assert_eq!(site.hub.awaited_formats(100_000), Formats { u16: true, ..Formats::default() });
+    assert_eq!(site.awaited_formats(10), Formats { f32: true, ..Formats::default() });
+    assert_eq!(site.awaited_formats(100_000), Formats { u16: true, ..Formats::default() });
     site.begin(1);
     drop(page);
     site.wait_for_clients(0);
-    assert_eq!(site.hub.awaited_formats(10), Formats::default());
+    assert_eq!(site.awaited_formats(10), Formats::default());
 }
 
 #[test]

@@ -17,6 +17,7 @@ use tungstenite::protocol::CloseFrame;
 use tungstenite::{Message, WebSocket};
 use viewer_bridge::message::Mode;
 use viewer_bridge::pages::assets::Assets;
+use viewer_bridge::pages::hub::Formats;
 use viewer_bridge::request::{Requests, requests};
 use viewer_bridge::scene::catalog::Catalog;
 use viewer_bridge::sink::{State, Update};
@@ -142,8 +143,19 @@ impl Site {
 
     /// Shows a frame of a step.
     pub(crate) fn show(&mut self, step: u64, particle_count: usize) {
+        self.show_with(step, particle_count, 0);
+    }
+
+    /// Shows a frame of a step with flags.
+    pub(crate) fn show_with(&mut self, step: u64, particle_count: usize, flags: u32) {
         let particles = vec![ParticleState::default(); particle_count];
-        self.shown.show(&self.sinks, state(step, &particles));
+        self.shown.show(&self.sinks, State { flags, ..state(step, &particles) });
+    }
+
+    /// The formats in which pages wait for a moving state.
+    pub(crate) fn awaited_formats(&self, particle_count: usize) -> Formats {
+        let particles = vec![ParticleState::default(); particle_count];
+        self.hub.awaited_formats(&state(0, &particles))
     }
 
     pub(crate) fn publish(&self, update: &Update<'_>) {

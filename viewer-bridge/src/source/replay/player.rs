@@ -49,7 +49,8 @@ pub(super) struct Player<'a> {
     answers: Vec<Answer>,
     /// The playback has changed since it was published.
     is_playback_changed: bool,
-    shown_step: Option<u64>,
+    /// The step on show, and whether the playback stood at it.
+    on_show: Option<(u64, bool)>,
     next_frame_ns: u64,
     next_statistics_ns: u64,
 }
@@ -88,7 +89,7 @@ impl<'a> Player<'a> {
             parameters: None,
             answers: Vec::new(),
             is_playback_changed: true,
-            shown_step: None,
+            on_show: None,
             next_frame_ns: 0,
             next_statistics_ns: 0,
         }
@@ -147,7 +148,7 @@ impl<'a> Player<'a> {
 
     fn handle(&mut self, Request { client, kind }: Request) -> Result<(), ReadError> {
         match kind {
-            RequestKind::State => self.shown_step = None,
+            RequestKind::State => self.on_show = None,
             // A recording has no grabs.
             RequestKind::Credit | RequestKind::Left => {}
             RequestKind::Command { id, command } => match self.obey(&command)? {
@@ -235,7 +236,7 @@ impl<'a> Player<'a> {
             let header = ForcesHeader { run_id, step, rate_hz, ..ForcesHeader::default() };
             let forces = row.map(|row| Forces { header, rows: row.rows() });
             if forces.is_some() {
-                self.shown_step = None;
+                self.on_show = None;
             }
             self.forces = Some((step, forces));
         }
@@ -291,15 +292,18 @@ impl<'a> Player<'a> {
             return;
         }
         self.next_frame_ns = now_ns + FRAME_PERIOD_NS;
-        if self.shown_step == Some(row.step) {
+        // A state that stays is shown again, because pages receive it exactly only while nothing moves.
+        let is_paused = !self.playhead.is_playing;
+        if self.on_show == Some((row.step, is_paused)) {
             return;
         }
-        self.shown_step = Some(row.step);
+        self.on_show = Some((row.step, is_paused));
+        let paused = if is_paused { frame_flag::PAUSED } else { 0 };
         let state = State {
             epoch: self.shown.epoch(),
             row,
             sim_time_s: self.recording.time_s(row.step),
-            flags: frame_flag::REPLAY,
+            flags: frame_flag::REPLAY | paused,
             publish_monotonic_ns: now_ns,
             particles: &self.state.particles,
             forces: self.forces.as_ref().and_then(|(_, forces)| forces.as_ref()),
