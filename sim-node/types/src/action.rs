@@ -208,6 +208,36 @@ pub enum Action {
     },
 }
 
+impl Action {
+    /// Name of the kind, as in the JSON form.
+    pub fn kind_name(&self) -> &'static str {
+        match self {
+            Self::Pin { .. } => "pin",
+            Self::Unpin { .. } => "unpin",
+            Self::Grab { .. } => "grab",
+            Self::Move { .. } => "move",
+            Self::Release { .. } => "release",
+            Self::Pause => "pause",
+            Self::Resume => "resume",
+            Self::Step { .. } => "step",
+            Self::Reset => "reset",
+            Self::Push { .. } => "push",
+            Self::Cut { .. } => "cut",
+            Self::CutRadius { .. } => "cut_radius",
+            Self::CutSegment { .. } => "cut_segment",
+            Self::MoveAnchor { .. } => "move_anchor",
+            Self::MoveCollider { .. } => "move_collider",
+            Self::Set { .. } => "set",
+            Self::Load { .. } => "load",
+            Self::Rewind { .. } => "rewind",
+            Self::Restore { .. } => "restore",
+            Self::Mark { .. } => "mark",
+            Self::DriveBody { .. } => "drive_body",
+            Self::Unknown { .. } => "unknown",
+        }
+    }
+}
+
 fn grab_over_s_default() -> f32 {
     GRAB_OVER_S_DEFAULT
 }
@@ -306,7 +336,8 @@ mod tests {
     fn the_table_of_fields_has_those_of_every_action() {
         let samples: Vec<_> =
             Action::samples().iter().map(|one| serde_json::to_value(one).unwrap()).collect();
-        for sample in &samples {
+        for (action, sample) in Action::samples().iter().zip(&samples) {
+            assert_eq!(sample["kind"], action.kind_name());
             let row = ActionFields::ALL.iter().find(|row| sample["kind"] == row.kind).unwrap();
             let fields = || row.required.iter().chain(row.optional).copied();
             let is_known = |name: &String| name == "kind" || fields().any(|field| field == name);

@@ -172,25 +172,25 @@ fn the_timeline_has_marks_and_the_result_of_the_hash_check() {
     assert_eq!((&timeline["first_step"], &timeline["last_step"]), (&json!(0), &json!(STEPS)));
     assert_eq!((&timeline["rate_hz"], &timeline["last_time_s"]), (&json!(240), &json!(4.0)));
     assert_eq!(timeline["incomplete"], "");
-    let mark =
-        |kind: &str, step: u64, count: u32| json!({ "kind": kind, "step": step, "count": count });
+    let tear = |step: u64| json!({ "kind": "tear", "step": step, "count": 1 });
+    let commands = |kind: &str, step: u64, names: &[&str]| json!({ "kind": kind, "step": step, "count": names.len(), "commands": names });
     let marks = [
-        mark("pin", 20, 1),
-        mark("tear", 50, 1),
-        mark("command", 50, 1),
-        mark("tear", 51, 1),
-        mark("command", 51, 1),
-        mark("command", 120, 1),
-        mark("pin", 200, 1),
-        mark("tear", 333, 1),
-        mark("command", 333, 1),
-        mark("command", 500, 1),
-        mark("tear", 640, 1),
-        mark("command", 640, 1),
-        mark("tear", 700, 1),
-        mark("command", 700, 2),
-        mark("tear", 701, 1),
-        mark("command", 701, 1),
+        commands("pin", 20, &["pin"]),
+        tear(50),
+        commands("command", 50, &["cut"]),
+        tear(51),
+        commands("command", 51, &["cut"]),
+        commands("command", 120, &["set"]),
+        commands("pin", 200, &["unpin"]),
+        tear(333),
+        commands("command", 333, &["cut"]),
+        commands("command", 500, &["reset"]),
+        tear(640),
+        commands("command", 640, &["cut"]),
+        tear(700),
+        commands("command", 700, &["reset", "cut"]),
+        tear(701),
+        commands("command", 701, &["cut"]),
     ];
     assert_eq!(timeline["marks"], json!(marks));
     // The parameters are those of the shown step.

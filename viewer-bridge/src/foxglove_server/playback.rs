@@ -79,7 +79,14 @@ mod tests {
         RecordingTimes { epoch_ns: 5 * SECOND_NS, rate_hz: 240, first_step: 60, last_step: 600 };
 
     fn playback(step: u64) -> Playback {
-        Playback { is_playing: false, rate: 1.0, is_looping: false, step, time_s: 0.0 }
+        Playback {
+            is_playing: false,
+            rate: 1.0,
+            is_looping: false,
+            loop_steps: None,
+            step,
+            time_s: 0.0,
+        }
     }
 
     fn request(command: PlaybackCommand, speed: f32, seek: Option<u64>) -> PlaybackControlRequest {

@@ -188,6 +188,12 @@ pub enum Command {
     },
     Loop {
         is_on: bool,
+        /// First step of the loop; without it, that of the recording.
+        #[serde(default)]
+        first_step: Option<u64>,
+        /// Last step of the loop; without it, that of the recording.
+        #[serde(default)]
+        last_step: Option<u64>,
     },
 }
 

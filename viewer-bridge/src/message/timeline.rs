@@ -3,6 +3,8 @@
 use serde::{Deserialize, Serialize};
 use sim_contract::Action;
 
+use crate::limits::COMMANDS_PER_MARK_MAX;
+
 /// The contents of a recording.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Timeline {
@@ -31,7 +33,7 @@ pub struct Timeline {
 }
 
 /// Events of one kind at a place on the timeline.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Mark {
     /// Kind of event.
     pub kind: MarkKind,
@@ -39,6 +41,41 @@ pub struct Mark {
     pub step: u64,
     /// Number of events.
     pub count: u32,
+    /// The commands among them, each kind once, in the order of their first; at most
+    /// [`COMMANDS_PER_MARK_MAX`]. The text of a `mark` follows its name.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub commands: Vec<String>,
+}
+
+impl Mark {
+    /// `count` events that are no commands.
+    pub(crate) fn new(kind: MarkKind, step: u64, count: u32) -> Self {
+        Self { kind, step, count, commands: Vec::new() }
+    }
+
+    /// An applied command.
+    pub(crate) fn of_action(action: &Action, step: u64) -> Self {
+        let kind = match action {
+            Action::Pin { .. } | Action::Unpin { .. } => MarkKind::Pin,
+            _ => MarkKind::Command,
+        };
+        let command = match action {
+            Action::Mark { text } => format!("mark: {}", text.as_str()),
+            _ => action.kind_name().to_owned(),
+        };
+        Self { kind, step, count: 1, commands: vec![command] }
+    }
+
+    /// Adds the events of another mark of this kind.
+    pub(crate) fn merge(&mut self, other: Self) {
+        self.step = self.step.min(other.step);
+        self.count = self.count.saturating_add(other.count);
+        for command in other.commands {
+            if self.commands.len() < COMMANDS_PER_MARK_MAX && !self.commands.contains(&command) {
+                self.commands.push(command);
+            }
+        }
+    }
 }
 
 /// Kind of event in a recording.
@@ -58,14 +95,6 @@ pub enum MarkKind {
 impl MarkKind {
     /// Number of kinds.
     pub(crate) const COUNT: usize = 4;
-
-    /// Kind of the mark of an applied command.
-    pub(crate) fn of_action(action: &Action) -> Self {
-        match action {
-            Action::Pin { .. } | Action::Unpin { .. } => Self::Pin,
-            _ => Self::Command,
-        }
-    }
 }
 
 /// The past of a live simulation that pages can look back at.
@@ -113,6 +142,8 @@ pub struct Playback {
     pub rate: f32,
     /// The playback starts again at its end.
     pub is_looping: bool,
+    /// First and last step of the loop; `None` if it is the whole recording.
+    pub loop_steps: Option<[u64; 2]>,
     /// Step on show.
     pub step: u64,
     /// Simulated time on show, in s.

@@ -74,7 +74,7 @@ impl History {
         self.now.tear = Some(tear);
         // A list that does not continue the one before is that of another state, after a rewind.
         if known_count == self.torn_count && count > known_count {
-            self.add_mark(MarkKind::Tear, step, count - known_count);
+            self.add_mark(Mark::new(MarkKind::Tear, step, count - known_count));
         }
         self.torn_count = count;
     }
@@ -87,23 +87,23 @@ impl History {
     /// Marks the step of an applied command.
     pub(super) fn add_outcome(&mut self, row: &OutcomeRow) {
         if row.is_applied() {
-            self.add_mark(MarkKind::of_action(&row.action), row.step, 1);
+            self.add_mark(Mark::of_action(&row.action, row.step));
         }
     }
 
-    fn add_mark(&mut self, kind: MarkKind, step: u64, count: u32) {
+    fn add_mark(&mut self, mark: Mark) {
         self.is_changed = true;
         let near = u64::from(self.rate_hz) / MARKS_PER_SECOND_MAX;
-        let is_near = |mark: &&mut Mark| mark.kind == kind && step <= mark.step + near;
-        if let Some(mark) = self.marks.iter_mut().rev().take(MarkKind::COUNT).find(is_near) {
-            mark.count = mark.count.saturating_add(count);
+        let is_near = |one: &&mut Mark| one.kind == mark.kind && mark.step <= one.step + near;
+        if let Some(near) = self.marks.iter_mut().rev().take(MarkKind::COUNT).find(is_near) {
+            near.merge(mark);
             return;
         }
         if self.marks.len() == HISTORY_MARKS_MAX {
             self.marks.pop_front();
         }
-        let place = self.marks.partition_point(|mark| mark.step <= step);
-        self.marks.insert(place, Mark { kind, step, count });
+        let place = self.marks.partition_point(|one| one.step <= mark.step);
+        self.marks.insert(place, mark);
     }
 
     /// Keeps a frame. A repeated one, in another format, is not kept again.
@@ -170,7 +170,7 @@ impl History {
         };
         HistoryText {
             first_step: self.states.front().map(|state| state.stamp.step),
-            marks: self.marks.iter().copied().collect(),
+            marks: self.marks.iter().cloned().collect(),
             text,
         }
     }
@@ -337,15 +337,15 @@ mod tests {
         let mut history = History::default();
         history.begin_load(200);
         for step in 0..10 {
-            history.add_mark(MarkKind::Tear, step, 2);
-            history.add_mark(MarkKind::Command, step, 1);
+            history.add_mark(Mark::new(MarkKind::Tear, step, 2));
+            history.add_mark(Mark::new(MarkKind::Command, step, 1));
         }
         let text = history.take_change().unwrap();
         let marks: Vec<_> =
             text.marks.iter().map(|mark| (mark.kind, mark.step, mark.count)).collect();
         assert_eq!(marks, [(MarkKind::Tear, 0, 20), (MarkKind::Command, 0, 10)]);
         for step in 0..10_000 {
-            history.add_mark(MarkKind::Tear, 100 * step, 1);
+            history.add_mark(Mark::new(MarkKind::Tear, 100 * step, 1));
         }
         let marks = history.take_change().unwrap().marks;
         assert!(marks.len() == HISTORY_MARKS_MAX && marks.is_sorted_by_key(|mark| mark.step));

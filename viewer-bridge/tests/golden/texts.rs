@@ -68,7 +68,7 @@ fn to_page() -> Vec<ToPage> {
         ToPage::Notice { level: Level::Warning, text: "look".to_owned() },
         ToPage::History(HistoryText {
             first_step: Some(1200),
-            marks: vec![Mark { kind: MarkKind::Tear, step: 1234, count: 3 }],
+            marks: vec![Mark { kind: MarkKind::Tear, step: 1234, count: 3, commands: Vec::new() }],
             text: String::new(),
         }),
         ToPage::Undoable { what: Some(Undoable::Cut) },
@@ -101,9 +101,17 @@ fn to_page_of_a_replay() -> Vec<ToPage> {
             last_step: 2400,
             first_time_s: 0.0,
             last_time_s: 10.0,
-            marks: [MarkKind::Tear, MarkKind::Pin, MarkKind::Command, MarkKind::Late]
-                .map(|kind| Mark { kind, step: 60, count: 1 })
-                .to_vec(),
+            marks: vec![
+                Mark { kind: MarkKind::Tear, step: 60, count: 3, commands: Vec::new() },
+                Mark { kind: MarkKind::Pin, step: 60, count: 1, commands: vec!["pin".to_owned()] },
+                Mark {
+                    kind: MarkKind::Command,
+                    step: 60,
+                    count: 4,
+                    commands: vec!["cut_radius".to_owned(), "mark: slips".to_owned()],
+                },
+                Mark { kind: MarkKind::Late, step: 300, count: 2, commands: Vec::new() },
+            ],
             hashes: Hashes::Checking,
             hash_text: "checking hashes".to_owned(),
             incomplete: "truncated after byte 4096; shown up to step 2400. \
@@ -113,7 +121,8 @@ fn to_page_of_a_replay() -> Vec<ToPage> {
         ToPage::Playback(Playback {
             is_playing: true,
             rate: 1.0,
-            is_looping: false,
+            is_looping: true,
+            loop_steps: Some([240, 480]),
             step: 240,
             time_s: 1.0,
         }),

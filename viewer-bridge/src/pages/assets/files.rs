@@ -69,6 +69,7 @@ pub(super) const FILES: &[(&str, &[u8])] = files![
     "js/state/weave.js",
     "js/state/wishes.js",
     "js/timeline/live-track.js",
+    "js/timeline/marks.js",
     "js/timeline/replay-track.js",
     "js/timeline/timeline-bar.js",
     "js/timeline/timeline.js",

@@ -103,12 +103,12 @@ impl Check {
         match message {
             Message::Tears(row) => {
                 let count = u32::try_from(row.constraints.len()).unwrap_or(u32::MAX);
-                self.marks.add(MarkKind::Tear, row.step, count);
+                self.marks.add(Mark::new(MarkKind::Tear, row.step, count));
             }
             Message::Outcome(row) => self.add_outcome(row),
             Message::Step(row) => {
                 if row.wake_late_ns > self.period_ns {
-                    self.marks.add(MarkKind::Late, row.step, 1);
+                    self.marks.add(Mark::new(MarkKind::Late, row.step, 1));
                 }
                 self.row = Some(*row);
             }
@@ -119,7 +119,7 @@ impl Check {
 
     fn add_outcome(&mut self, row: &OutcomeRow) {
         if row.is_applied() {
-            self.marks.add(MarkKind::of_action(&row.action), row.step, 1);
+            self.marks.add(Mark::of_action(&row.action, row.step));
         }
     }
 

@@ -1,6 +1,7 @@
 //! The marks of a timeline. Marks that are close together are merged, which limits their number.
 
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 
 use crate::limits::MARKS_MAX;
 use crate::message::{Mark, MarkKind};
@@ -15,7 +16,7 @@ const PER_KIND_MAX: u64 = (MARKS_MAX / KINDS.len()) as u64;
 pub(super) struct Marks {
     first_step: u64,
     last_step: u64,
-    merged: BTreeMap<Place, Merged>,
+    merged: BTreeMap<Place, Mark>,
 }
 
 /// A section of the timeline, and a kind by its index in [`KINDS`].
@@ -25,21 +26,16 @@ struct Place {
     kind_index: usize,
 }
 
-#[derive(Debug, Clone, Copy)]
-struct Merged {
-    first_step: u64,
-    count: u32,
-}
-
 impl Marks {
     /// Creates the marks of a timeline between these steps.
     pub(super) fn new(first_step: u64, last_step: u64) -> Self {
         Self { first_step, last_step, merged: BTreeMap::new() }
     }
 
-    /// Adds `count` events at a step. Events after the last step count as being at it.
-    pub(super) fn add(&mut self, kind: MarkKind, step: u64, count: u32) {
-        let step = step.clamp(self.first_step, self.last_step);
+    /// Adds a mark. Events after the last step count as being at it.
+    pub(super) fn add(&mut self, mark: Mark) {
+        let step = mark.step.clamp(self.first_step, self.last_step);
+        let mark = Mark { step, ..mark };
         let steps = u128::from(self.last_step - self.first_step) + 1;
         let section = if steps <= u128::from(PER_KIND_MAX) {
             step - self.first_step
@@ -49,21 +45,16 @@ impl Marks {
         };
         #[allow(clippy::expect_used, reason = "a miss is a fault of the list of kinds")]
         let kind_index =
-            KINDS.iter().position(|one| *one == kind).expect("every kind is in the list");
-        let merged = self.merged.entry(Place { section, kind_index });
-        let merged = merged.or_insert(Merged { first_step: step, count: 0 });
-        merged.first_step = merged.first_step.min(step);
-        merged.count = merged.count.saturating_add(count);
+            KINDS.iter().position(|one| *one == mark.kind).expect("every kind is in the list");
+        match self.merged.entry(Place { section, kind_index }) {
+            Entry::Vacant(place) => drop(place.insert(mark)),
+            Entry::Occupied(mut merged) => merged.get_mut().merge(mark),
+        }
     }
 
     /// All marks, ascending by step.
     pub(super) fn list(&self) -> Vec<Mark> {
-        let marks = self.merged.iter().map(|(place, merged)| Mark {
-            kind: KINDS[place.kind_index],
-            step: merged.first_step,
-            count: merged.count,
-        });
-        let mut marks: Vec<_> = marks.collect();
+        let mut marks: Vec<_> = self.merged.values().cloned().collect();
         marks.sort_by_key(|mark| mark.step);
         marks
     }
@@ -71,15 +62,17 @@ impl Marks {
 
 #[cfg(test)]
 mod tests {
+    use sim_contract::{Action, Text};
+
     use super::*;
 
     #[test]
     fn marks_are_counted_by_step_and_kind() {
         let mut marks = Marks::new(10, 500);
-        marks.add(MarkKind::Late, 20, 1);
-        marks.add(MarkKind::Tear, 12, 3);
-        marks.add(MarkKind::Tear, 12, 2);
-        marks.add(MarkKind::Command, 501, 1);
+        marks.add(Mark::new(MarkKind::Late, 20, 1));
+        marks.add(Mark::new(MarkKind::Tear, 12, 3));
+        marks.add(Mark::new(MarkKind::Tear, 12, 2));
+        marks.add(Mark::new(MarkKind::Command, 501, 1));
         let list: Vec<_> =
             marks.list().iter().map(|mark| (mark.kind, mark.step, mark.count)).collect();
         let expected =
@@ -92,7 +85,7 @@ mod tests {
         let mut marks = Marks::new(5, 1_000_000);
         for step in (0..142_857).rev().map(|place| 5 + 7 * place) {
             for kind in KINDS {
-                marks.add(kind, step, 1);
+                marks.add(Mark::new(kind, step, 1));
             }
         }
         let list = marks.list();
@@ -103,9 +96,23 @@ mod tests {
     }
 
     #[test]
+    fn a_mark_names_each_of_its_commands_once() {
+        let mut marks = Marks::new(0, 9);
+        let mark = |text| Action::Mark { text: Text::cut(text) };
+        let (cut, set) = (Action::Cut { constraint: 3 }, Action::Reset);
+        for action in [cut, set, cut, mark("slips"), mark("holds"), mark("slips")] {
+            marks.add(Mark::of_action(&action, 5));
+        }
+        marks.add(Mark::of_action(&Action::Pin { particle: 1 }, 5));
+        let commands: Vec<_> = marks.list().into_iter().map(|mark| mark.commands).collect();
+        let others = ["cut", "reset", "mark: slips", "mark: holds"];
+        assert_eq!(commands, [["pin"].to_vec(), others.to_vec()]);
+    }
+
+    #[test]
     fn the_largest_step_has_a_place() {
         let mut marks = Marks::new(0, u64::MAX);
-        marks.add(MarkKind::Pin, u64::MAX, 1);
+        marks.add(Mark::new(MarkKind::Pin, u64::MAX, 1));
         assert_eq!(marks.list()[0].step, u64::MAX);
     }
 }

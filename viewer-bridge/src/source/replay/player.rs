@@ -97,7 +97,7 @@ impl<'a> Player<'a> {
 
     /// Plays from now on, again and again.
     pub(super) fn start_looping(&mut self) {
-        self.playhead.is_looping = true;
+        self.playhead.loop_between(None, None, monotonic_ns());
         self.playhead.resume(monotonic_ns());
     }
 
@@ -175,7 +175,12 @@ impl<'a> Player<'a> {
             Command::Pause {} => playhead.pause(now_ns),
             Command::Resume {} => playhead.resume(now_ns),
             Command::Rate { value } => playhead.set_rate(*value, now_ns),
-            Command::Loop { is_on } => playhead.is_looping = *is_on,
+            Command::Loop { is_on: false, .. } => playhead.stop_looping(now_ns),
+            Command::Loop { is_on: true, first_step, last_step } => {
+                if !playhead.loop_between(*first_step, *last_step, now_ns) {
+                    return Ok(Err(Reason::OutOfRange.into()));
+                }
+            }
             Command::Seek { step } => {
                 let step = self.recording.tape.step_at(*step)?;
                 playhead.go_to(step, now_ns);

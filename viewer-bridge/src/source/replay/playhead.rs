@@ -10,8 +10,10 @@ pub(super) struct Playhead {
     rate_hz: u32,
     /// The place advances.
     pub(super) is_playing: bool,
-    /// The place returns to the first step after the last one.
+    /// The place returns to the first step of the loop after the last one.
     pub(super) is_looping: bool,
+    /// First and last step of the loop.
+    looped: [u64; 2],
     /// Simulated seconds per second.
     pub(super) rate: f32,
     /// Place at `base_ns`, in steps.
@@ -37,6 +39,7 @@ impl Playhead {
             rate_hz,
             is_playing: false,
             is_looping: false,
+            looped: [first_step, last_step],
             rate: 1.0,
             base_step: first_step as f64,
             base_ns: 0,
@@ -65,7 +68,8 @@ impl Playhead {
     /// Advances to this time.
     pub(super) fn advance(&mut self, now_ns: u64) -> Advanced {
         let place = self.place(now_ns);
-        if !self.is_playing || place < self.last_step as f64 {
+        let [first_step, last_step] = self.looped;
+        if !self.is_playing || place < last_step as f64 {
             return Advanced::Within;
         }
         if !self.is_looping {
@@ -74,14 +78,45 @@ impl Playhead {
             return Advanced::ToEnd;
         }
         // The last step is on show for as long as any other.
-        let period = (self.last_step - self.first_step + 1) as f64;
-        let elapsed = place - self.first_step as f64;
+        let period = (last_step - first_step + 1) as f64;
+        let elapsed = place - first_step as f64;
         if elapsed < period {
             return Advanced::Within;
         }
-        self.base_step = self.first_step as f64 + elapsed % period;
+        self.base_step = first_step as f64 + elapsed % period;
         self.base_ns = now_ns;
         Advanced::ToEnd
+    }
+
+    /// First and last step of the loop; `None` if it is the whole recording, or off.
+    pub(super) fn loop_steps(&self) -> Option<[u64; 2]> {
+        Some(self.looped).filter(|looped| *looped != [self.first_step, self.last_step])
+    }
+
+    /// Plays the steps of a range again and again; the whole recording without a range. A place outside
+    /// moves to its first step. Returns false, and changes nothing, if the range has no step.
+    pub(super) fn loop_between(
+        &mut self,
+        first_step: Option<u64>,
+        last_step: Option<u64>,
+        now_ns: u64,
+    ) -> bool {
+        let first_step = first_step.unwrap_or(0).max(self.first_step);
+        let last_step = last_step.unwrap_or(u64::MAX).min(self.last_step);
+        if first_step > last_step {
+            return false;
+        }
+        (self.is_looping, self.looped) = (true, [first_step, last_step]);
+        if !(first_step..=last_step).contains(&self.step(now_ns)) {
+            self.go_to(first_step, now_ns);
+        }
+        true
+    }
+
+    /// Plays to the end of the recording, and pauses there.
+    pub(super) fn stop_looping(&mut self, now_ns: u64) {
+        self.go_to(self.step(now_ns), now_ns);
+        (self.is_looping, self.looped) = (false, [self.first_step, self.last_step]);
     }
 
     /// Pauses at the present place.
@@ -95,8 +130,8 @@ impl Playhead {
         if self.is_playing {
             return;
         }
-        if self.base_step >= self.last_step as f64 {
-            self.base_step = self.first_step as f64;
+        if self.base_step >= self.looped[1] as f64 {
+            self.base_step = self.looped[0] as f64;
         }
         self.base_ns = now_ns;
         self.is_playing = true;
@@ -165,7 +200,7 @@ mod tests {
     #[test]
     fn a_loop_shows_every_step_for_the_same_time() {
         let mut head = playhead();
-        head.is_looping = true;
+        assert!(head.loop_between(None, None, 0));
         head.resume(0);
         assert_eq!((head.advance(ms(1005)), head.step(ms(1005))), (Advanced::Within, 150));
         assert_eq!((head.advance(ms(1015)), head.step(ms(1015))), (Advanced::ToEnd, 50));
@@ -175,6 +210,30 @@ mod tests {
             (Advanced::ToEnd, true)
         );
         assert_eq!(head.step(ms(1015 + 3 * 1010 + 20)), 52);
+    }
+
+    #[test]
+    fn a_loop_between_two_steps_stays_between_them() {
+        let mut head = playhead();
+        head.go_to(120, 0);
+        assert!(head.loop_between(Some(60), Some(69), 0));
+        assert_eq!((head.step(0), head.loop_steps()), (60, Some([60, 69])));
+        head.resume(0);
+        assert_eq!((head.advance(ms(95)), head.step(ms(95))), (Advanced::Within, 69));
+        assert_eq!((head.advance(ms(325)), head.step(ms(325))), (Advanced::ToEnd, 62));
+        // A seek beyond the loop returns to it.
+        head.go_to(140, ms(330));
+        assert_eq!((head.advance(ms(330)), head.step(ms(330))), (Advanced::ToEnd, 60));
+        assert!(!head.loop_between(Some(70), Some(69), ms(330)));
+        assert!(!head.loop_between(Some(151), None, ms(330)));
+        head.stop_looping(ms(335));
+        assert_eq!((head.loop_steps(), head.is_looping), (None, false));
+        assert_eq!((head.advance(ms(2000)), head.step(ms(2000))), (Advanced::ToEnd, 150));
+        assert!(head.loop_between(Some(150), Some(9999), ms(2000)));
+        head.resume(ms(2000));
+        assert_eq!((head.advance(ms(2099)), head.step(ms(2099))), (Advanced::ToEnd, 150));
+        // The whole recording is no range.
+        assert!(head.loop_between(Some(0), Some(9999), ms(2100)) && head.loop_steps().is_none());
     }
 
     #[test]

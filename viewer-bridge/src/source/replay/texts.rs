@@ -29,6 +29,7 @@ pub(super) fn playback(recording: &Recording, playhead: &Playhead, step: u64) ->
         is_playing: playhead.is_playing,
         rate: playhead.rate,
         is_looping: playhead.is_looping,
+        loop_steps: playhead.loop_steps(),
         step,
         time_s: recording.time_s(step),
     }

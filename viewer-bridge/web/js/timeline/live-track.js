@@ -4,7 +4,7 @@
 import { find } from "../ui/dom.js";
 import { clockText } from "./timeline.js";
 
-/** @typedef {import("./timeline-bar.js").Track} Track */
+/** @typedef {import("./timeline.js").Track} Track */
 /** @typedef {import("../net/messages.js").OutcomeMessage} Outcome */
 
 /** The steps from `first` to `last` of the last `seconds`, or all of them if it is 0. @param {number} first @param {number} last @param {number} seconds @param {number} rateHz */
@@ -58,6 +58,10 @@ export class LiveTrack {
     return this.simulation.history?.marks ?? [];
   }
 
+  get looped() {
+    return null;
+  }
+
   get place() {
     return this.simulation.frame?.step ?? null;
   }
@@ -68,6 +72,11 @@ export class LiveTrack {
     if (!isLookingBack) this.current = rangeOfLast(history?.first_step ?? last, last, Number(this.span.value), this.rateHz);
     const { first } = this.current;
     return { first: Math.min(first, frame?.step ?? first), last: this.current.last };
+  }
+
+  /** Time since the load of the scene, in s. @param {number} step */
+  sinceBegin(step) {
+    return step / this.rateHz;
   }
 
   /** @param {number} step */
@@ -83,6 +92,11 @@ export class LiveTrack {
     this.simulation.returnToPresent();
     done();
     return true;
+  }
+
+  /** @param {number} step */
+  showMark(step) {
+    this.commands.run("look", { step, toward: "after" });
   }
 
   /** Looks at the kept state before or after the one on show. @param {number} count */

@@ -1,9 +1,9 @@
 // The timeline of a recording: playback, and the check of its hashes.
 
 import { enable, find, make } from "../ui/dom.js";
-import { clockText } from "./timeline.js";
+import { clockText, zoomed } from "./timeline.js";
 
-/** @typedef {import("./timeline-bar.js").Track} Track */
+/** @typedef {import("./timeline.js").Track} Track */
 
 /** Rates to choose from; a different rate set by another page is added. */
 const RATES = [0.1, 0.25, 0.5, 1, 2, 5, 10];
@@ -18,10 +18,19 @@ export class ReplayTrack {
     this.rate = find("rate", HTMLSelectElement);
     this.play = find("play", HTMLButtonElement);
     this.loop = find("loop", HTMLButtonElement);
+    this.loopStart = find("loop-start", HTMLButtonElement);
+    this.loopEnd = find("loop-end", HTMLButtonElement);
+    this.zoom = find("zoom", HTMLSelectElement);
+    /** The part of the recording on show. */
+    this.current = { first: 0, last: 0 };
     this.hashes = find("hashes", HTMLOutputElement);
     this.onChange = () => {};
     this.play.addEventListener("click", () => commands.run(simulation.playback?.is_playing ? "pause" : "resume"));
     this.loop.addEventListener("click", () => commands.run("loop", { is_on: !(simulation.playback?.is_looping ?? false) }));
+    this.loopStart.addEventListener("click", () => this.loopFrom());
+    this.loopEnd.addEventListener("click", () => this.loopTo());
+    this.zoom.addEventListener("change", () => this.onChange());
+    find("track", HTMLElement).addEventListener("wheel", (event) => this.zoomBy(event), { passive: false });
     this.rate.addEventListener("change", () => commands.run("rate", { value: Number(this.rate.value) }));
     simulation.on("timeline", () => this.showRecording());
     simulation.on("playback", () => this.showPlayback());
@@ -44,14 +53,60 @@ export class ReplayTrack {
     return this.simulation.frame?.step ?? this.simulation.playback?.step ?? null;
   }
 
-  range() {
+  get looped() {
+    return this.simulation.playback?.loop_steps ?? null;
+  }
+
+  get whole() {
     const { first_step: first, last_step: last } = this.simulation.timeline ?? { first_step: 0, last_step: 0 };
     return { first, last };
   }
 
+  /** The part of the recording on show. */
+  range() {
+    const length = Math.max(0, Math.round(Number(this.zoom.value) * this.rateHz));
+    this.current = zoomed(this.whole, this.current, this.place ?? this.whole.first, length);
+    return this.current;
+  }
+
+  /** Time since the begin of the recording, in s. @param {number} step */
+  sinceBegin(step) {
+    return (step - this.whole.first) / this.rateHz;
+  }
+
   /** @param {number} step */
   clock(step) {
-    return `${clockText(step / this.rateHz)} / ${clockText(this.range().last / this.rateHz)}`;
+    return `${clockText(this.sinceBegin(step))} / ${clockText(this.sinceBegin(this.whole.last))}`;
+  }
+
+  /** Zooms in or out around the state on show, as the wheel turns. @param {WheelEvent} event */
+  zoomBy(event) {
+    if (!this.isThere || event.deltaY === 0) return;
+    event.preventDefault();
+    const index = this.zoom.selectedIndex + (event.deltaY < 0 ? 1 : -1);
+    this.zoom.selectedIndex = Math.min(Math.max(0, index), this.zoom.options.length - 1);
+    this.onChange();
+  }
+
+  /** Repeats the recording from the state on show, up to the end of the loop if that is later. */
+  loopFrom() {
+    const { place, looped } = this;
+    if (place === null) return;
+    const isEnd = looped !== null && looped[1] > place;
+    this.commands.run("loop", isEnd ? { is_on: true, first_step: place, last_step: looped[1] } : { is_on: true, first_step: place });
+  }
+
+  /** Repeats the recording up to the state on show, from the start of the loop if that is earlier. */
+  loopTo() {
+    const { place, looped } = this;
+    if (place === null) return;
+    const isStart = looped !== null && looped[0] < place;
+    this.commands.run("loop", isStart ? { is_on: true, first_step: looped[0], last_step: place } : { is_on: true, last_step: place });
+  }
+
+  /** @param {number} step */
+  showMark(step) {
+    this.commands.run("seek", { step });
   }
 
   /** @param {number} step @param {() => void} done */
@@ -79,7 +134,7 @@ export class ReplayTrack {
   /** Disables the controls without a connection. */
   showConnection() {
     const reason = this.simulation.isConnected ? "" : "There is no connection to the bridge.";
-    for (const control of [this.play, this.loop, this.rate]) enable(control, reason);
+    for (const control of [this.play, this.loop, this.loopStart, this.loopEnd, this.rate, this.zoom]) enable(control, reason);
     this.showPlayback();
   }
 
@@ -90,6 +145,9 @@ export class ReplayTrack {
     this.play.setAttribute("aria-pressed", String(isPlaying));
     this.play.setAttribute("aria-label", isPlaying ? "Pause" : "Play");
     this.loop.setAttribute("aria-pressed", String(playback.is_looping));
+    const { looped, whole } = this;
+    this.loopStart.setAttribute("aria-pressed", String(looped !== null && looped[0] > whole.first));
+    this.loopEnd.setAttribute("aria-pressed", String(looped !== null && looped[1] < whole.last));
     const rates = [...new Set([...RATES, playback.rate])].sort((a, b) => a - b);
     this.rate.replaceChildren(...rates.map((rate) => make("option", { value: rate, selected: rate === playback.rate }, `${rate} ×`)));
     this.onChange();

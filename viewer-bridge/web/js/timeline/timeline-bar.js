@@ -1,21 +1,12 @@
 // The timeline under the picture: marks, scrubbing and stepping. Positions are steps, as in commands. It
 // shows a recording, or the past of a live simulation.
 
-import { cssColor, enable, find, sharpContext } from "../ui/dom.js";
-import { Scale, SeekGate, clockText, marksByPixel } from "./timeline.js";
+import { enable, find } from "../ui/dom.js";
+import { MarkRow, stepOfMark } from "./marks.js";
+import { Scale, SeekGate, clockText } from "./timeline.js";
 
-/**
- * What the timeline shows and moves. `place` is the step on show; null keeps the timeline as it is.
- * @typedef {{
- *   name: "live" | "replay", isThere: boolean, rateHz: number, marks: import("../net/messages.js").Mark[], place: number | null,
- *   range(): { first: number, last: number }, clock(step: number): string,
- *   seek(step: number, done: () => void): boolean, step(count: number): void, onChange: () => void,
- * }} Track
- */
+/** @typedef {import("./timeline.js").Track} Track */
 
-/** Colour and row per kind of mark. */
-const MARKS = { tear: ["--accent", 0], pin: ["--plot-a", 1], command: ["--plot-c", 1], late: ["--plot-b", 2] };
-const ROW_HEIGHT = 5;
 /** Least interval between updates of the timeline while time passes, and between drawings of marks that move. */
 const SHOW_INTERVAL_MS = 100;
 const MARKS_INTERVAL_MS = 500;
@@ -29,7 +20,9 @@ export class TimelineBar {
     this.slider = find("seek", HTMLInputElement);
     this.back = find("back", HTMLButtonElement);
     this.forward = find("forward", HTMLButtonElement);
-    this.canvas = find("marks", HTMLCanvasElement);
+    this.previousMark = find("previous-mark", HTMLButtonElement);
+    this.nextMark = find("next-mark", HTMLButtonElement);
+    this.marks = new MarkRow((step) => this.track.showMark(step));
     this.clock = find("clock", HTMLOutputElement);
     // An answer reopens the gate in the next animation frame, once the step has been drawn.
     this.gate = new SeekGate((step, done) => this.track.seek(step, () => requestAnimationFrame(() => {
@@ -58,7 +51,9 @@ export class TimelineBar {
     for (const type of ["change", "pointerup", "pointercancel", "blur"]) slider.addEventListener(type, () => { this.isScrubbing = false; });
     this.back.addEventListener("click", () => this.step(-1));
     this.forward.addEventListener("click", () => this.step(1));
-    new ResizeObserver(() => this.drawMarks()).observe(this.canvas);
+    this.previousMark.addEventListener("click", () => this.goToMark(-1));
+    this.nextMark.addEventListener("click", () => this.goToMark(1));
+    new ResizeObserver(() => this.drawMarks()).observe(this.marks.canvas);
     for (const track of [this.tracks.replay, this.tracks.live]) track.onChange = () => this.show();
     simulation.on("hello", () => this.show());
     simulation.on("connection", () => this.showConnection());
@@ -84,6 +79,14 @@ export class TimelineBar {
     if (this.track.isThere) this.track.step(count);
   }
 
+  /** Shows the nearest mark after the state on show, or before it. @param {number} direction */
+  goToMark(direction) {
+    const { track } = this;
+    if (!track.isThere || track.place === null) return;
+    const step = stepOfMark(track.marks, track.place, direction);
+    if (step !== null) track.showMark(step);
+  }
+
   /** Shows the range and the marks of the track. An empty timeline keeps its place, so that the picture never jumps. */
   show() {
     const { track } = this;
@@ -91,6 +94,8 @@ export class TimelineBar {
     this.element.setAttribute("aria-label", track.name === "live" ? "History" : "Recording");
     const reason = this.reasonAgainst();
     for (const control of [this.back, this.forward, this.slider]) enable(control, reason);
+    const reasonOfMarks = reason || (track.marks.length > 0 ? "" : "There are no marks.");
+    for (const control of [this.previousMark, this.nextMark]) enable(control, reasonOfMarks);
     this.marksMs = 0;
     this.follow(true);
     if (this.marksMs === 0) this.drawMarks();
@@ -117,21 +122,11 @@ export class TimelineBar {
   showStep(step) {
     const { track } = this;
     this.clock.textContent = track.clock(step);
-    this.slider.setAttribute("aria-valuetext", `step ${step}, ${clockText(step / track.rateHz)}`);
+    this.clock.title = `Step ${step}, simulated time ${clockText(step / track.rateHz)}`;
+    this.slider.setAttribute("aria-valuetext", `step ${step}, ${clockText(track.sinceBegin(step))}`);
   }
 
   drawMarks() {
-    const { track, slider } = this;
-    const { context, width } = sharpContext(this.canvas);
-    const scale = new Scale(Number(slider.min), Number(slider.max));
-    const marks = track.marks.filter(({ step }) => step >= scale.first);
-    for (const [kind, pixels] of marksByPixel(marks, scale, width)) {
-      const [color, row] = MARKS[/** @type {keyof typeof MARKS} */ (kind)] ?? ["--soft", 1];
-      context.fillStyle = cssColor(String(color));
-      for (const pixel of pixels.keys()) context.fillRect(pixel - 0.5, Number(row) * ROW_HEIGHT, 2, ROW_HEIGHT - 1);
-    }
-    const counts = new Map();
-    for (const { kind, count } of marks) counts.set(kind, (counts.get(kind) ?? 0) + count);
-    this.canvas.title = [...counts].map(([kind, count]) => `${kind}: ${count}`).join(", ");
+    this.marks.draw(this.track, new Scale(Number(this.slider.min), Number(this.slider.max)));
   }
 }

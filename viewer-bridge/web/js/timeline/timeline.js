@@ -2,12 +2,28 @@
 // with at most one seek in flight.
 
 /** @typedef {import("../net/messages.js").Mark} Mark */
+/** @typedef {{ first: number, last: number }} Range  steps */
+/**
+ * What the timeline shows and moves. `place` is the step on show; null keeps the timeline as it is. `looped` are the first
+ * and the last step that the track repeats, if it repeats a part. `showMark` shows the state at a mark or just after it.
+ * @typedef {{
+ *   name: "live" | "replay", isThere: boolean, rateHz: number, marks: Mark[], place: number | null,
+ *   looped: number[] | null, range(): Range, clock(step: number): string, sinceBegin(step: number): number,
+ *   showMark(step: number): void,
+ *   seek(step: number, done: () => void): boolean, step(count: number): void, onChange: () => void,
+ * }} Track
+ */
 
 export class Scale {
   /** @param {number} first @param {number} last steps */
   constructor(first, last) {
     this.first = first;
     this.last = Math.max(first, last);
+  }
+
+  /** @param {number} step */
+  has(step) {
+    return step >= this.first && step <= this.last;
   }
 
   /** Position of a step on the bar, 0..=1. @param {number} step */
@@ -20,6 +36,19 @@ export class Scale {
   step(fraction) {
     return Math.round(this.first + Math.min(1, Math.max(0, fraction)) * (this.last - this.first));
   }
+}
+
+/**
+ * The part of a range that a zoomed timeline shows. It stays as long as the place is in it; then it moves on, with the place
+ * in its first quarter, so that most of it is ahead.
+ * @param {Range} whole @param {Range} current @param {number} place @param {number} length in steps; 0 shows the whole range
+ * @returns {Range}
+ */
+export function zoomed(whole, current, place, length) {
+  if (length === 0 || length >= whole.last - whole.first) return whole;
+  if (current.last - current.first === length && place >= current.first && place <= current.last) return current;
+  const first = Math.min(Math.max(whole.first, place - Math.floor(length / 4)), whole.last - length);
+  return { first, last: first + length };
 }
 
 /** The number of marked events per kind and pixel. @param {Mark[]} marks @param {Scale} scale @param {number} width */

@@ -16,7 +16,7 @@ const KEY_ZOOM = 1.2;
 export class Controls {
   /**
    * @param {import("../tools/tool.js").App} app @param {import("../tools/input.js").Input} input
-   * @param {import("./views.js").Views} views @param {{ step(count: number): void }} timeline
+   * @param {import("./views.js").Views} views @param {{ step(count: number): void, goToMark(direction: number): void }} timeline
    * @param {import("./undo.js").Undo} undo
    */
   constructor(app, input, views, timeline, undo) {
@@ -71,6 +71,8 @@ export class Controls {
       " ": () => this.togglePause(),
       ".": () => (app.simulation.isLookingBack ? this.timeline.step(1) : this.stepOnce(1)),
       ",": () => this.timeline.step(-1),
+      "<": () => this.timeline.goToMark(-1),
+      ">": () => this.timeline.goToMark(1),
       r: () => { if (!this.reset.disabled) app.commands.run("reset"); },
       "ctrl+z": () => this.undo.run(),
       f: () => views.fit(),

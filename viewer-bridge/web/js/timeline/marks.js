@@ -1,0 +1,105 @@
+// The marks of a timeline: their legend, their tooltips, and the way from one to the next.
+
+import { cssColor, find, make, sharpContext } from "../ui/dom.js";
+import { Scale, clockText, marksByPixel } from "./timeline.js";
+
+/** @typedef {import("../net/messages.js").Mark} Mark */
+/** @typedef {import("./timeline.js").Track} Track */
+
+/** Colour, row and name per kind of mark. @type {Record<string, [color: string, row: number, name: string]>} */
+const KINDS = {
+  tear: ["--accent", 0, "torn"],
+  pin: ["--plot-a", 1, "pins"],
+  command: ["--plot-c", 1, "commands"],
+  late: ["--plot-b", 2, "late steps"],
+};
+const ROW_HEIGHT = 5;
+/** Distance in pixels at which the pointer is at a mark. */
+const NEAR = 4;
+const TOOLTIP_LINES_MAX = 8;
+
+/** One line about a mark. @param {Mark} mark @param {(step: number) => string} clock */
+export function describe({ kind, step, count, commands = [] }, clock) {
+  return `${clock(step)}, step ${step}: ${what(kind, count, commands)}`;
+}
+
+/** @param {string} kind @param {number} count @param {string[]} commands */
+function what(kind, count, commands) {
+  if (kind === "tear") return `${count} ${count === 1 ? "constraint" : "constraints"} torn`;
+  if (kind === "late") return `${count} ${count === 1 ? "step" : "steps"} late`;
+  const names = commands.join(", ") || kind;
+  return count > Math.max(1, commands.length) ? `${names} (${count} commands)` : names;
+}
+
+/** The step of the nearest mark after a place, or before it if `direction` is negative. @param {Mark[]} marks @param {number} place @param {number} direction @returns {number | null} */
+export function stepOfMark(marks, place, direction) {
+  const steps = marks.map(({ step }) => step).filter((step) => (direction < 0 ? step < place : step > place));
+  if (steps.length === 0) return null;
+  return steps.reduce((best, step) => (direction < 0 ? Math.max(best, step) : Math.min(best, step)));
+}
+
+/** The marks within some pixels of a position, nearest first. @param {Mark[]} marks @param {Scale} scale @param {number} x @param {number} width */
+export function marksAt(marks, scale, x, width) {
+  const distance = (/** @type {Mark} */ { step }) => Math.abs(scale.fraction(step) * width - x);
+  return marks.filter((mark) => scale.has(mark.step) && distance(mark) <= NEAR).sort((a, b) => distance(a) - distance(b));
+}
+
+/** The row of marks above the slider. */
+export class MarkRow {
+  /** @param {(step: number) => void} onPick is called with the step of a mark that the user clicks */
+  constructor(onPick) {
+    this.canvas = find("marks", HTMLCanvasElement);
+    this.legend = find("mark-legend", HTMLUListElement);
+    /** @type {Mark[]} */
+    this.marks = [];
+    this.scale = new Scale(0, 0);
+    /** @type {(step: number) => string} */
+    this.clock = clockText;
+    const near = (/** @type {PointerEvent | MouseEvent} */ event) => marksAt(this.marks, this.scale, event.offsetX, this.canvas.clientWidth);
+    this.canvas.addEventListener("pointermove", (event) => {
+      const lines = near(event).map((mark) => describe(mark, this.clock));
+      this.canvas.classList.toggle("is-at-mark", lines.length > 0);
+      if (lines.length > TOOLTIP_LINES_MAX) lines.splice(TOOLTIP_LINES_MAX, Infinity, "…");
+      this.canvas.title = lines.join("\n");
+    });
+    this.canvas.addEventListener("click", (event) => {
+      const [mark] = near(event);
+      if (mark !== undefined) onPick(mark.step);
+    });
+  }
+
+  /** Draws the marks of a track in a range, and the part that it repeats. @param {Track} track @param {Scale} scale */
+  draw(track, scale) {
+    const { marks, looped } = track;
+    const { context, width } = sharpContext(this.canvas);
+    this.scale = scale;
+    this.marks = marks.filter(({ step }) => scale.has(step));
+    this.clock = (step) => clockText(track.sinceBegin(step));
+    if (looped !== null) {
+      const [from, to] = looped.map((step) => scale.fraction(step) * width);
+      context.fillStyle = cssColor("--line");
+      context.fillRect(from, 0, Math.max(2, to - from), 3 * ROW_HEIGHT);
+    }
+    for (const [kind, pixels] of marksByPixel(this.marks, scale, width)) {
+      const [color, row] = KINDS[kind] ?? ["--soft", 1];
+      context.fillStyle = cssColor(color);
+      for (const pixel of pixels.keys()) context.fillRect(pixel - 0.5, row * ROW_HEIGHT, 2, ROW_HEIGHT - 1);
+    }
+    this.showLegend();
+  }
+
+  /** Shows the colours of the kinds that have marks, with the number of their events. */
+  showLegend() {
+    /** @type {Map<string, number>} */
+    const counts = new Map();
+    for (const { kind, count } of this.marks) counts.set(kind, (counts.get(kind) ?? 0) + count);
+    const kinds = Object.keys(KINDS).filter((kind) => counts.has(kind));
+    const text = kinds.map((kind) => `${KINDS[kind][2]} ${counts.get(kind)}`);
+    if (this.legend.textContent === text.join("")) return;
+    this.legend.replaceChildren(...kinds.map((kind, index) => {
+      const item = make("li", {}, text[index]);
+      item.style.setProperty("--swatch", `var(${KINDS[kind][0]})`);
+      return item;
+    }));
+  }
+}
