@@ -215,11 +215,13 @@ fn a_reset_reverts_cuts_and_pins_of_the_same_pause_in_the_picture() {
     let intact = rig.tab.hash();
     let camera = rig.tab.camera();
     let pixel = |particle: usize| camera.project(state.particles[particle].position);
-    // Down between two columns, across the sticks that join them.
-    let [from, to] = [TARGET, TARGET + COLUMNS].map(|particle| {
+    // Down between two columns, from above the stick that joins them in one row to below that of the next.
+    let [upper, lower] = [TARGET, TARGET + COLUMNS].map(|particle| {
         let (left, right) = (pixel(particle), pixel(particle + 1));
         [0, 1].map(|axis| f64::midpoint(left[axis], right[axis]))
     });
+    let [from, to] =
+        [-0.3, 1.3].map(|part| [0, 1].map(|axis| upper[axis] + part * (lower[axis] - upper[axis])));
     rig.tab.press(from, Button::Right);
     rig.tab.stroke(from, to, 4);
     rig.tab.release(to);
