@@ -79,14 +79,7 @@ mod tests {
         RecordingTimes { epoch_ns: 5 * SECOND_NS, rate_hz: 240, first_step: 60, last_step: 600 };
 
     fn playback(step: u64) -> Playback {
-        Playback {
-            is_playing: false,
-            rate: 1.0,
-            is_looping: false,
-            loop_steps: None,
-            step,
-            time_s: 0.0,
-        }
+        Playback { rate: 1.0, step, ..Playback::default() }
     }
 
     fn request(command: PlaybackCommand, speed: f32, seek: Option<u64>) -> PlaybackControlRequest {

@@ -134,7 +134,7 @@ pub enum Hashes {
 }
 
 /// The playback of a recording.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Playback {
     /// Time advances.
     pub is_playing: bool,

@@ -12,7 +12,7 @@ use crate::wire::{Format, frame_flag};
 pub(crate) struct FrameSet {
     /// Number of the frame; ascending.
     pub(crate) number: u32,
-    /// What decides the format of each page.
+    /// The properties that decide the format of each page.
     pub(crate) traits: Traits,
     /// FRAME f32.
     pub(crate) f32: Option<Bytes>,
@@ -70,7 +70,7 @@ impl Formats {
     }
 }
 
-/// What decides the format in which a page receives a state.
+/// The properties of a state that decide the format in which a page receives it.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Traits {
     /// Number of particles.

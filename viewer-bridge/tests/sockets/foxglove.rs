@@ -478,14 +478,7 @@ fn a_client_can_observe_and_control_playback() {
             _ => None,
         })
     };
-    let paused = Playback {
-        is_playing: false,
-        rate: 1.0,
-        is_looping: false,
-        loop_steps: None,
-        step: 0,
-        time_s: 0.0,
-    };
+    let paused = Playback { rate: 1.0, ..Playback::default() };
     site.sinks.publish(&Update::Playback(&paused));
     assert_eq!(state(&mut client), (1, 5 * second_ns, 1.0, false, String::new()));
     client.play(0, 2.0, Some(6 * second_ns), "seven");
