@@ -31,6 +31,7 @@ use viewer_bridge::{FoxgloveOptions, FoxglovePermission, RecordingTimes, TokenDe
         viewer-bridge --listen 127.0.0.1:0          use any free port; the address is printed\n  \
         viewer-bridge --name left --domain lab      show another node\n  \
         viewer-bridge --replay run.mcap             show a recording; needs no node\n  \
+        viewer-bridge --replay recordings           show the newest recording of a folder\n  \
         viewer-bridge --listen 0.0.0.0:8080         serve other machines; the address has a token\n  \
         viewer-bridge --token                       keep other users of this machine out\n  \
         viewer-bridge --recordings runs             pages record into this folder\n  \
@@ -59,8 +60,8 @@ pub(crate) struct Args {
     #[arg(long)]
     token: bool,
     /// Recording to show instead of a node, written by `recorder record` or `recorder simulate`; an
-    /// incomplete file is shown as far as it goes
-    #[arg(long, value_name = "FILE.mcap", conflicts_with_all = ["name", "domain"])]
+    /// incomplete file is shown as far as it goes. Of a folder, the newest one, and pages can open the others
+    #[arg(long, value_name = "FILE.mcap or DIR", conflicts_with_all = ["name", "domain"])]
     pub(crate) replay: Option<PathBuf>,
     /// Play the recording at once, again and again, for viewers that cannot control the playback. Pages
     /// can pause it and turn the repetition off [default: paused at its first step]

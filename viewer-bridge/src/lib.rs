@@ -34,6 +34,8 @@ pub use foxglove_server::{
 };
 pub use pages::hub::Hub;
 pub use pages::recordings::Recordings;
+pub use pages::recordings::file_name::newest_recording;
+pub use pages::replays::Replays;
 pub use pages::server::{Server, ServerOptions};
 pub use shutdown::Shutdown;
 pub use sink::Sinks;

@@ -74,6 +74,8 @@ pub const UNDO_SIZE_BYTES_MAX: usize = 64 << 20;
 pub const HISTORY_MARKS_MAX: usize = 256;
 /// Marks on a timeline.
 pub const MARKS_MAX: usize = 4096;
+/// Recordings of a folder that a page can choose from.
+pub const RECORDINGS_LISTED_MAX: usize = 256;
 /// Commands that a mark on a timeline names.
 pub const COMMANDS_PER_MARK_MAX: usize = 8;
 

@@ -5,6 +5,7 @@
 mod args;
 
 use std::future::poll_fn;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::task::Poll;
@@ -22,8 +23,8 @@ use viewer_bridge::source::live::Live;
 use viewer_bridge::source::replay::Replay;
 use viewer_bridge::source::thread::start_source;
 use viewer_bridge::{
-    FoxgloveOptions, FoxgloveServer, Hub, Recordings, Server, ServerOptions, Shutdown, Sinks,
-    Source, open_files_warning,
+    FoxgloveOptions, FoxgloveServer, Hub, Recordings, Replays, Server, ServerOptions, Shutdown,
+    Sinks, Source, newest_recording, open_files_warning,
 };
 
 use args::{Args, RecordingPlan};
@@ -78,16 +79,28 @@ fn run(args: &Args) -> anyhow::Result<()> {
         .build()
         .context("starting the threads of the servers")?;
     let recording = args.recording_plan()?;
-    runtime.block_on(serve(source, Servers { pages: options, foxglove, recording }, stop))
+    let replays = args.replay.clone().filter(|path| path.is_dir());
+    runtime.block_on(serve(source, Servers { pages: options, foxglove, recording, replays }, stop))
 }
 
 fn open_source(args: &Args, stop: &Stop) -> anyhow::Result<Box<dyn Source>> {
     if let Some(path) = &args.replay {
-        return Ok(Box::new(Replay::open(path, args.start(), stop, &mut note)?));
+        let newest =
+            path.is_dir().then(|| newest_recording(path).ok_or_else(|| no_recording(path)));
+        let path = newest.transpose()?.unwrap_or_else(|| path.clone());
+        return Ok(Box::new(Replay::open(&path, args.start(), stop, &mut note)?));
     }
     let mut catalog = Catalog::default();
     args.scenes.iter().try_for_each(|path| catalog.add_file(path))?;
     Ok(Box::new(Live::new(args.endpoint()?, catalog)))
+}
+
+fn no_recording(folder: &Path) -> anyhow::Error {
+    anyhow!(
+        "{}: has no recording (*.mcap); give a file written by `recorder record` or `recorder simulate`, or a \
+         folder of them",
+        folder.display()
+    )
 }
 
 /// The servers, and the recordings of their pages.
@@ -96,23 +109,31 @@ struct Servers {
     foxglove: Option<FoxgloveOptions>,
     /// The recordings that pages can start, if the source is live.
     recording: Option<RecordingPlan>,
+    /// Folder of the recordings that pages of a replay can open instead.
+    replays: Option<PathBuf>,
 }
 
 /// Serves until a signal arrives or the source ends.
 async fn serve(source: Box<dyn Source>, servers: Servers, stop: Stop) -> anyhow::Result<()> {
     let stop_signal = stop_signal(&stop)?;
-    let Servers { pages, foxglove, recording } = servers;
+    let Servers { pages, foxglove, recording, replays } = servers;
     let server = Server::bind(pages).await?;
     let (sender, requests) = requests();
     let shutdown = Shutdown::default();
     let mode = source.mode();
-    let hub = Arc::new(Hub::new(mode, source.scenes(), sender.clone()));
+    let hub = Hub::new(mode, source.scenes(), sender.clone()).with_folder(replays.clone());
+    let hub = Arc::new(hub);
     let mut sinks = Sinks::new(shutdown.clone());
     sinks.add(Arc::<Hub>::clone(&hub));
-    let recordings = recording.map(|RecordingPlan { endpoint, folder }| {
-        let folder = folder.folder(server.is_local());
-        Arc::new(Recordings::new(Arc::clone(&hub), endpoint, folder, stop))
-    });
+    let (recordings, replays) = match recording {
+        None => (None, replays),
+        Some(RecordingPlan { endpoint, folder }) => {
+            let folder = folder.folder(server.is_local());
+            let recordings = Recordings::new(Arc::clone(&hub), endpoint, folder.clone());
+            (Some(Arc::new(recordings)), folder)
+        }
+    };
+    let replays = Replays::new(replays, stop);
     let foxglove = match foxglove {
         None => None,
         Some(options) => {
@@ -135,7 +156,7 @@ async fn serve(source: Box<dyn Source>, servers: Servers, stop: Stop) -> anyhow:
         }
         shutdown.begin();
     };
-    let serve_pages = server.serve(hub, recordings.clone(), shutdown.clone());
+    let serve_pages = server.serve(hub, recordings.clone(), replays, shutdown.clone());
     tokio::join!(serve_pages, serve_foxglove, wait_for_end);
     if let Some(recordings) = recordings {
         recordings.finish();

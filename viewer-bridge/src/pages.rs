@@ -7,6 +7,6 @@ mod frame_set;
 mod history;
 pub mod hub;
 pub mod recordings;
-mod replays;
+pub mod replays;
 pub mod server;
 mod session;

@@ -152,6 +152,31 @@ fn a_timeline_goes_from_mark_to_mark_zooms_and_repeats_a_part() {
 
 #[test]
 #[ignore = "needs Chromium"]
+fn a_page_opens_the_other_recordings_of_a_folder() {
+    let sandbox = Sandbox::new();
+    let folder = sandbox.path("runs");
+    std::fs::create_dir(&folder).unwrap();
+    for scene in ["rope", "flag"] {
+        let file = format!("{folder}/the {scene}.mcap");
+        let args = ["simulate", scene, "--steps", "24", "-o", &file];
+        Process::run(Program::Recorder, &sandbox, &args).success();
+    }
+    let replay = ReplayRig::open(sandbox, &folder, "");
+    replay
+        .tab
+        .wait("viewer.scene === 'flag' && document.querySelector('#file').value === 'the flag'");
+    for scene in ["rope", "flag"] {
+        replay.tab.evaluate(&format!(
+            "void (file => {{ file.value = 'the {scene}'; file.dispatchEvent(new Event('change')); }})(document.querySelector('#file'))"
+        ));
+        replay.tab.wait(&format!(
+            "viewer.scene === '{scene}' && document.querySelector('#file').value === 'the {scene}' && viewer.frame >= 0"
+        ));
+    }
+}
+
+#[test]
+#[ignore = "needs Chromium"]
 fn the_page_says_that_a_recording_is_truncated_until_a_live_bridge_takes_its_address() {
     let sandbox = Sandbox::new();
     let whole = sandbox.path("whole.mcap");

@@ -3,6 +3,7 @@
 //! The recorder's library reads the expected states from the start of the file.
 
 use std::path::Path;
+use std::time::{Duration, SystemTime};
 
 use integration_tests::{Process, Program, Sandbox, ctl, record};
 use recorder::{Frame, FrameReader, LogReader, Message as Logged, RunDescription};
@@ -426,7 +427,8 @@ fn a_file_that_is_not_a_recording_is_named_before_anything_is_served() {
     std::fs::write(&head, &whole[..300]).unwrap();
     let give = "give a file written by `recorder record` or `recorder simulate`";
     let again = "record again with `recorder record`";
-    let folder = sandbox.path("");
+    let folder = sandbox.path("empty");
+    std::fs::create_dir(&folder).unwrap();
     let cases = [
         (sandbox.path("missing.mcap"), "no such file", give),
         (sandbox.write("empty.mcap", ""), "is empty", again),
@@ -435,7 +437,7 @@ fn a_file_that_is_not_a_recording_is_named_before_anything_is_served() {
             "is not an MCAP file",
             give,
         ),
-        (folder, "is not a file", give),
+        (folder, "has no recording (*.mcap)", give),
         (head, "has no readable header", again),
     ];
     for (file, cause, remedy) in cases {
@@ -448,6 +450,37 @@ fn a_file_that_is_not_a_recording_is_named_before_anything_is_served() {
     }
     let both = Process::run(Program::ViewerBridge, &sandbox, &["--replay", "a", "--name", "b"]);
     assert_eq!(both.code, Some(2), "{}", both.stderr);
+}
+
+#[test]
+fn a_folder_shows_its_newest_recording_and_pages_open_the_others() {
+    let sandbox = Sandbox::new();
+    let folder = Path::new(&sandbox.path("runs")).to_owned();
+    std::fs::create_dir(&folder).unwrap();
+    for (age_s, (scene, file)) in
+        [("rope", "new.mcap"), ("flag", "day 1.mcap"), ("ragdoll", "old.mcap")].iter().enumerate()
+    {
+        let path = folder.join(file);
+        let args = ["simulate", scene, "--steps", "24", "-o", path.to_str().unwrap()];
+        Process::run(Program::Recorder, &sandbox, &args).success();
+        let modified = SystemTime::UNIX_EPOCH + Duration::from_secs(1_764_072_001 - age_s as u64);
+        std::fs::File::options().append(true).open(&path).unwrap().set_modified(modified).unwrap();
+    }
+    let bridge = Bridge::start_with(&sandbox, &["--replay", folder.to_str().unwrap()]);
+    let mut newest = bridge.page();
+    assert_eq!(newest.hello["recordings"], json!(["new", "day 1", "old"]));
+    assert_eq!(newest.scene().text.name, "rope");
+    for (name, scene) in [("day%201", "flag"), ("old", "ragdoll"), ("new", "rope")] {
+        let mut page = bridge.page_at(&format!("/replay/{name}/socket"));
+        assert_eq!(page.hello["recordings"], newest.hello["recordings"]);
+        assert_eq!(page.scene().text.name, scene);
+    }
+    let (_, reason) = bridge.refusal_at("/replay/..%2Fother/socket", &json!({}));
+    assert_eq!(reason, "there is no such recording");
+    // A recording of a file beside others has no list.
+    let one = folder.join("old.mcap");
+    let bridge = Bridge::start_with(&sandbox, &["--replay", one.to_str().unwrap()]);
+    assert_eq!(bridge.page().hello["recordings"], Value::Null);
 }
 
 #[test]

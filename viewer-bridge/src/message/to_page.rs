@@ -90,6 +90,9 @@ pub struct Welcome {
     pub format: Choice,
     /// Scenes that can be loaded.
     pub scenes: Vec<SceneEntry>,
+    /// Names of the recordings that a replay can open instead, newest first.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub recordings: Vec<String>,
     /// Limits that the page must keep.
     pub limits: PageLimits,
 }

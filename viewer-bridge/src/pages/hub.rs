@@ -6,6 +6,7 @@
 //! empties its queue before it sends a frame. Therefore no frame arrives before its scene.
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use axum::extract::ws::Message;
@@ -18,6 +19,7 @@ use super::frame_encoder::{FrameEncoder, Wanted};
 pub use super::frame_set::Formats;
 use super::frame_set::{FrameSet, Traits};
 use super::history::{History, PastMessages, Viewer};
+use super::recordings::file_name::names_in;
 use crate::limits::{PROTOCOL, RELIABLE_QUEUED_MAX};
 use crate::message::{
     Choice, Level, Mode, Node, PageLimits, RecordingText, Refusal, ToPage, Toward, Welcome,
@@ -50,6 +52,8 @@ enum Slot {
 pub struct Hub {
     mode: Mode,
     scenes: Vec<SceneEntry>,
+    /// Folder of the recordings that pages of a replay can open instead.
+    folder: Option<PathBuf>,
     state: Mutex<HubState>,
     encoder: Mutex<FrameEncoder>,
     /// The past of a live simulation.
@@ -114,12 +118,19 @@ impl Hub {
         Self {
             mode,
             scenes,
+            folder: None,
             state: Mutex::default(),
             encoder: Mutex::default(),
             history: Mutex::default(),
             frames: watch::Sender::default(),
             requests,
         }
+    }
+
+    /// Lets the pages of a replay choose from the recordings of a folder.
+    #[must_use]
+    pub fn with_folder(self, folder: Option<PathBuf>) -> Self {
+        Self { folder, ..self }
     }
 
     /// Returns the formats in which pages with credit wait for this state.
@@ -284,6 +295,7 @@ impl Hub {
             mode: self.mode,
             format,
             scenes: self.scenes.clone(),
+            recordings: self.folder.as_deref().map(names_in).unwrap_or_default(),
             limits: PageLimits::default(),
         }
     }

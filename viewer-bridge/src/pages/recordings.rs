@@ -3,7 +3,7 @@
 //! The recorder ends its file cleanly on a signal, and also when nobody reads its progress any longer. So
 //! it neither stays behind nor loses its file if this process is killed.
 
-pub(in crate::pages) mod file_name;
+pub mod file_name;
 mod recorder_process;
 
 use std::fs;
@@ -12,9 +12,9 @@ use std::sync::{Arc, Mutex, MutexGuard};
 use std::thread::{self, JoinHandle};
 
 use anyhow::Context;
+use sim_contract::Endpoint;
 use sim_contract::clock::realtime_ns;
 use sim_contract::console::note;
-use sim_contract::{Endpoint, Stop};
 
 use super::hub::{Hub, lock};
 use crate::message::{NodeState, RecordingState, RecordingText, Refusal};
@@ -31,7 +31,6 @@ pub struct Recordings {
     endpoint: Endpoint,
     /// Folder of the files; `None` if pages may not record.
     folder: Option<PathBuf>,
-    stop: Stop,
     present: Mutex<Present>,
 }
 
@@ -66,7 +65,7 @@ impl Present {
 impl Recordings {
     /// Records the node at `endpoint` for the pages of `hub`, into `folder`. Without a folder, pages
     /// cannot record.
-    pub fn new(hub: Arc<Hub>, endpoint: Endpoint, folder: Option<PathBuf>, stop: Stop) -> Self {
+    pub fn new(hub: Arc<Hub>, endpoint: Endpoint, folder: Option<PathBuf>) -> Self {
         let shown = RecordingText {
             state: if folder.is_some() {
                 RecordingState::Idle
@@ -81,17 +80,7 @@ impl Recordings {
         };
         hub.publish_recording(&shown);
         let present = Mutex::new(Present { shown, ..Present::default() });
-        Self { hub, endpoint, folder, stop, present }
-    }
-
-    /// Folder of the recordings that pages can open.
-    pub(super) fn folder(&self) -> Option<&Path> {
-        self.folder.as_deref()
-    }
-
-    /// The signals that end this program.
-    pub(super) fn stop_signals(&self) -> &Stop {
-        &self.stop
+        Self { hub, endpoint, folder, present }
     }
 
     /// Starts a recording.

@@ -1,6 +1,6 @@
 //! The finished recordings that pages have opened: each is a source of its own, with pages of its own.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::thread::JoinHandle;
 
@@ -21,8 +21,8 @@ use crate::source::replay::{InitialPlayback, Replay};
 use crate::source::thread::start_source;
 
 /// The open recordings of a folder.
-#[derive(Debug, Default)]
-pub(super) struct Replays {
+#[derive(Debug)]
+pub struct Replays {
     /// `None` if the bridge has no recordings.
     folder: Option<PathBuf>,
     stop: Stop,
@@ -40,8 +40,9 @@ struct OpenReplay {
 }
 
 impl Replays {
-    pub(super) fn new(folder: Option<&Path>, stop: Stop) -> Self {
-        Self { folder: folder.map(Path::to_owned), stop, open: Mutex::default() }
+    /// Pages can open the recordings of this folder, if there is one, until a signal arrives.
+    pub fn new(folder: Option<PathBuf>, stop: Stop) -> Self {
+        Self { folder, stop, open: Mutex::default() }
     }
 
     /// Returns the hub of a recording, and the flag that ends it. Opens the recording if it is not open,
@@ -73,7 +74,8 @@ impl Replays {
             let causes: Vec<_> = error.chain().skip(1).map(ToString::to_string).collect();
             causes.join(": ")
         })?;
-        let replay = OpenReplay::start(name, replay).map_err(|error| format!("{error:#}"))?;
+        let started = OpenReplay::start(name, replay, self.folder.clone());
+        let replay = started.map_err(|error| format!("{error:#}"))?;
         let found = (Arc::clone(&replay.hub), replay.shutdown.clone());
         open.push(replay);
         Ok(found)
@@ -88,10 +90,11 @@ impl Replays {
 }
 
 impl OpenReplay {
-    fn start(name: &str, replay: Replay) -> anyhow::Result<Self> {
+    fn start(name: &str, replay: Replay, folder: Option<PathBuf>) -> anyhow::Result<Self> {
         let (sender, requests) = requests();
         let shutdown = Shutdown::default();
-        let hub = Arc::new(Hub::new(Mode::Replay, replay.scenes(), sender));
+        let hub = Hub::new(Mode::Replay, replay.scenes(), sender).with_folder(folder);
+        let hub = Arc::new(hub);
         let mut sinks = Sinks::new(shutdown.clone());
         sinks.add(Arc::<Hub>::clone(&hub));
         let source = start_source(Box::new(replay), sinks, requests, shutdown.clone())?;

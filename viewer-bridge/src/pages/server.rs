@@ -93,18 +93,16 @@ impl Server {
         self.guard.is_local()
     }
 
-    /// Serves until the shutdown begins and every page has been informed. Pages can start and open
-    /// `recordings`, if there are any.
+    /// Serves until the shutdown begins and every page has been informed. Pages can start `recordings`, if
+    /// there are any, and open `replays`.
     pub async fn serve(
         self,
         hub: Arc<Hub>,
         recordings: Option<Arc<Recordings>>,
+        replays: Replays,
         shutdown: Shutdown,
     ) {
         let pages = client_permits();
-        let replays = recordings.as_ref().map_or_else(Replays::default, |recordings| {
-            Replays::new(recordings.folder(), recordings.stop_signals().clone())
-        });
         let sessions = Sessions {
             hub,
             recordings,

@@ -32,6 +32,7 @@ fn to_page() -> Vec<ToPage> {
             mode: Mode::Live,
             format: Choice::Auto,
             scenes: Catalog::default().entries().to_vec(),
+            recordings: vec!["run 2".to_owned(), "run".to_owned()],
             limits: PageLimits::default(),
         })),
         ToPage::Node(Node { text: "no node runs".to_owned(), ..Node::default() }),

@@ -8,8 +8,8 @@ use std::time::Duration;
 use recorder::StepRow;
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 use serde_json::Value;
-use sim_contract::ParticleState;
 use sim_contract::clock::{SECOND_NS, monotonic_ns, sleep_until};
+use sim_contract::{ParticleState, Stop};
 use tokio::runtime::Runtime;
 use tungstenite::client::IntoClientRequest;
 use tungstenite::http::{HeaderValue, Request, header};
@@ -23,7 +23,7 @@ use viewer_bridge::scene::catalog::Catalog;
 use viewer_bridge::sink::{State, Update};
 use viewer_bridge::source::shown_state::ShownState;
 use viewer_bridge::wire::{self, Scene, decode};
-use viewer_bridge::{Hub, Server, ServerOptions, Shutdown, Sinks, TokenDemand};
+use viewer_bridge::{Hub, Replays, Server, ServerOptions, Shutdown, Sinks, TokenDemand};
 
 /// Limit on every wait. It is generous, because the machine may be busy.
 const DEADLINE: Duration = Duration::from_mins(1);
@@ -77,7 +77,12 @@ impl Site {
         sinks.add(Arc::<Hub>::clone(&hub));
         let port = url.rsplit(':').next().unwrap().split('/').next().unwrap();
         let address = SocketAddr::from(([127, 0, 0, 1], port.parse().unwrap()));
-        runtime.spawn(server.serve(Arc::clone(&hub), None, shutdown.clone()));
+        runtime.spawn(server.serve(
+            Arc::clone(&hub),
+            None,
+            Replays::new(None, Stop::default()),
+            shutdown.clone(),
+        ));
         let shown = ShownState::default();
         Self { hub, sinks, shutdown, requests, address, url, shown, _runtime: runtime }
     }

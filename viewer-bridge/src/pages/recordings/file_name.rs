@@ -1,10 +1,13 @@
-//! Names of recordings. A page never chooses a file: the bridge names what it writes, and opens only a
-//! name without any path in its own folder.
+//! Names of recordings. A page never chooses a path: the bridge names what it writes, and opens only names
+//! in its own folder.
 
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, UNIX_EPOCH};
 
 use sim_contract::part_path;
+
+use crate::limits::RECORDINGS_LISTED_MAX;
 
 /// Longest part of a name that comes from the scene.
 const SCENE_LENGTH_MAX: usize = 48;
@@ -39,10 +42,40 @@ pub(super) fn name_of(path: &Path) -> Option<String> {
     path.file_stem().and_then(|stem| stem.to_str()).map(str::to_owned)
 }
 
+/// Returns whether a text names a file in a folder, and no place outside.
+fn is_name(name: &str) -> bool {
+    let is_letter = |letter: char| !letter.is_control() && letter != '/' && letter != '\\';
+    !name.is_empty()
+        && name.len() <= NAME_LENGTH_MAX
+        && !name.starts_with('.')
+        && name.chars().all(is_letter)
+}
+
 /// Returns the file of a name in the folder; `None` if it is not a plain name.
 pub(in crate::pages) fn path_of(folder: &Path, name: &str) -> Option<PathBuf> {
-    let is_name = !name.is_empty() && name.len() <= NAME_LENGTH_MAX && name.chars().all(is_plain);
-    is_name.then(|| folder.join(format!("{name}.{ENDING}")))
+    is_name(name).then(|| folder.join(format!("{name}.{ENDING}")))
+}
+
+/// Returns the names of the recordings in a folder, newest first. Empty if the folder cannot be read.
+pub(in crate::pages) fn names_in(folder: &Path) -> Vec<String> {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut found: Vec<_> = entries
+        .map(|entry| entry.path())
+        .filter(|path| path.extension().is_some_and(|ending| ending == ENDING))
+        .filter_map(|path| {
+            let metadata = fs::metadata(&path).ok().filter(fs::Metadata::is_file)?;
+            Some((metadata.modified().ok()?, name_of(&path).filter(|name| is_name(name))?))
+        })
+        .collect();
+    found.sort_unstable_by(|a, b| b.cmp(a));
+    found.truncate(RECORDINGS_LISTED_MAX);
+    found.into_iter().map(|(_, name)| name).collect()
+}
+
+/// Returns the newest recording in a folder.
+pub fn newest_recording(folder: &Path) -> Option<PathBuf> {
+    let names = names_in(folder);
+    names.first().and_then(|name| path_of(folder, name))
 }
 
 #[cfg(test)]
@@ -66,24 +99,44 @@ mod tests {
     #[test]
     fn a_name_that_is_taken_gets_a_number() {
         let folder = std::env::temp_dir().join(format!("catenary-names-{}", std::process::id()));
-        std::fs::create_dir_all(&folder).unwrap();
+        fs::create_dir_all(&folder).unwrap();
         let first = free_path(&folder, "rope", NOON_NS);
-        std::fs::write(part_path(&first), "").unwrap();
+        fs::write(part_path(&first), "").unwrap();
         let second = free_path(&folder, "rope", NOON_NS);
-        std::fs::write(&second, "").unwrap();
+        fs::write(&second, "").unwrap();
         let third = free_path(&folder, "rope", NOON_NS);
-        std::fs::remove_dir_all(&folder).unwrap();
+        fs::remove_dir_all(&folder).unwrap();
         assert!(second.ends_with("rope_2025-11-25T12-00-00Z_2.mcap"), "{second:?}");
         assert!(third.ends_with("rope_2025-11-25T12-00-00Z_3.mcap"), "{third:?}");
     }
 
     #[test]
-    fn only_plain_names_are_opened() {
+    fn only_names_within_the_folder_are_opened() {
         let folder = Path::new("/nowhere");
-        for name in
-            ["", ".", "..", "../a", "a/b", "a.mcap", "a\\b", "a b", "\u{0}", "é", &"x".repeat(129)]
+        for name in ["", ".", "..", ".a", "../a", "a/b", "a\\b", "a\nb", "\u{0}", &"x".repeat(129)]
         {
             assert_eq!(path_of(folder, name), None, "{name:?}");
         }
+        for name in ["a", "a b", "a.2", "é", "a..b"] {
+            assert_eq!(path_of(folder, name), Some(folder.join(format!("{name}.mcap"))));
+        }
+    }
+
+    #[test]
+    fn recordings_are_listed_newest_first_and_nothing_else_is() {
+        let folder = std::env::temp_dir().join(format!("catenary-list-{}", std::process::id()));
+        fs::create_dir_all(folder.join("folder.mcap")).unwrap();
+        let begin = UNIX_EPOCH + Duration::from_hours(490_020);
+        for (age_s, name) in
+            [(3, "old.mcap"), (1, "é 2.mcap"), (2, "b.mcap"), (0, "c.mcap.part"), (0, ".d.mcap")]
+        {
+            let file = fs::File::create(folder.join(name)).unwrap();
+            file.set_modified(begin - Duration::from_secs(age_s)).unwrap();
+        }
+        let (names, newest) = (names_in(&folder), newest_recording(&folder));
+        fs::remove_dir_all(&folder).unwrap();
+        assert_eq!(names, ["é 2", "b", "old"]);
+        assert_eq!(newest, Some(folder.join("é 2.mcap")));
+        assert_eq!((names_in(&folder), newest_recording(&folder)), (Vec::new(), None));
     }
 }

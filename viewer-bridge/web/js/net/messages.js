@@ -5,7 +5,7 @@
 /**
  * @typedef {{
  *   type: "hello", protocol: number, version: string, client: number, mode: "live" | "replay", format: string,
- *   scenes: SceneEntry[],
+ *   scenes: SceneEntry[], recordings?: string[],
  *   limits: { constraints_per_cut: number, [name: string]: number },
  * }} Hello
  * @typedef {{

@@ -8,6 +8,9 @@ import { clockText, zoomed } from "./timeline.js";
 /** Rates to choose from; a different rate set by another page is added. */
 const RATES = [0.1, 0.25, 0.5, 1, 2, 5, 10];
 
+/** The address of a recording, seen from the page of another or from that of the newest. @param {string} path of the page @param {string} name */
+export const addressBeside = (path, name) => `${path.replace(/replay\/[^/]+\/$/, "")}replay/${encodeURIComponent(name)}/`;
+
 /** @implements {Track} */
 export class ReplayTrack {
   /** @param {import("../state/simulation.js").Simulation} simulation @param {import("../net/commands.js").Commands} commands */
@@ -23,6 +26,7 @@ export class ReplayTrack {
     this.zoom = find("zoom", HTMLSelectElement);
     /** The part of the recording on show. */
     this.current = { first: 0, last: 0 };
+    this.file = find("file", HTMLSelectElement);
     this.hashes = find("hashes", HTMLOutputElement);
     this.onChange = () => {};
     this.play.addEventListener("click", () => commands.run(simulation.playback?.is_playing ? "pause" : "resume"));
@@ -32,6 +36,8 @@ export class ReplayTrack {
     this.zoom.addEventListener("change", () => this.onChange());
     find("track", HTMLElement).addEventListener("wheel", (event) => this.zoomBy(event), { passive: false });
     this.rate.addEventListener("change", () => commands.run("rate", { value: Number(this.rate.value) }));
+    this.file.addEventListener("change", () => { location.href = addressBeside(location.pathname, this.file.value); });
+    simulation.on("hello", ({ recordings = [] }) => this.showFiles(recordings));
     simulation.on("timeline", () => this.showRecording());
     simulation.on("playback", () => this.showPlayback());
     simulation.on("connection", () => this.showConnection());
@@ -127,14 +133,27 @@ export class ReplayTrack {
       this.hashes.classList.toggle("is-good", timeline.hashes === "verified");
       this.hashes.classList.toggle("is-bad", timeline.hashes === "diverged");
       this.hashes.title = timeline.file;
+      this.showFile();
     }
     this.onChange();
+  }
+
+  /** Offers the recordings of the folder. @param {string[]} names */
+  showFiles(names) {
+    find("file-choice", HTMLElement).hidden = names.length < 2;
+    this.file.replaceChildren(...names.map((name) => make("option", { value: name }, name)));
+    this.showFile();
+  }
+
+  /** Chooses the recording on show. */
+  showFile() {
+    this.file.value = this.simulation.timeline?.file.replace(/\.mcap$/, "") ?? "";
   }
 
   /** Disables the controls without a connection. */
   showConnection() {
     const reason = this.simulation.isConnected ? "" : "There is no connection to the bridge.";
-    for (const control of [this.play, this.loop, this.loopStart, this.loopEnd, this.rate, this.zoom]) enable(control, reason);
+    for (const control of [this.play, this.loop, this.loopStart, this.loopEnd, this.rate, this.zoom, this.file]) enable(control, reason);
     this.showPlayback();
   }
 

@@ -3,6 +3,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { describe, marksAt, stepOfMark } from "../../js/timeline/marks.js";
+import { addressBeside } from "../../js/timeline/replay-track.js";
 import { Scale, clockText, zoomed } from "../../js/timeline/timeline.js";
 
 const marks = [{ kind: "tear", step: 100, count: 3 }, { kind: "pin", step: 200, count: 1, commands: ["pin"] }, { kind: "late", step: 200, count: 1 }, { kind: "command", step: 340, count: 9, commands: ["cut_radius", "mark: slips"] }];
@@ -28,6 +29,12 @@ test("the pointer finds the marks within four pixels of a zoomed timeline", () =
   assert.deepEqual(at(new Scale(0, 1000), 205), []);
   assert.deepEqual(at(new Scale(150, 250), 500), ["pin", "late"]);
   assert.deepEqual(at(new Scale(150, 250), 0), [], "a mark outside the range is not at its end");
+});
+
+test("the pages of a folder's recordings lie beside each other", () => {
+  assert.equal(addressBeside("/", "run 2"), "/replay/run%202/");
+  assert.equal(addressBeside("/replay/run/", "a.b"), "/replay/a.b/");
+  assert.equal(addressBeside("/lab/replay/run%202/", "run"), "/lab/replay/run/");
 });
 
 test("a zoomed timeline stays until the place leaves it, and never leaves the recording", () => {
