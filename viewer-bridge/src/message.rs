@@ -1,5 +1,6 @@
 //! The text messages of the protocol with the pages, as `PROTOCOL.md` describes them.
 
+mod body_drive;
 mod check;
 mod from_page;
 mod recording;
@@ -7,6 +8,7 @@ mod refusal;
 mod timeline;
 mod to_page;
 
+pub use body_drive::BodyDrive;
 pub use check::check;
 pub use from_page::{Choice, Command, FromPage, Hello, Malformed, Wish};
 pub use recording::{RecordingState, RecordingText};

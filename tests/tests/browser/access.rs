@@ -36,13 +36,13 @@ fn screen_readers_hear_values_and_no_plots_or_clocks() {
     assert_eq!(text(&format!("{sliders}[1]")), "-9.81 m/s²");
     assert_eq!(text("document.querySelector('#set-tear_force')"), "off N");
     assert_eq!(rig.tab.number(&format!("{sliders}.filter(one => !one.ariaValueText).length")), 0.0);
-    // A live region speaks at each change. An output is one unless it is turned off. The two that say what is
-    // selected and what the cursor is at change only when the user acts, and that of a recording only at its start
-    // and its end.
+    // A live region speaks at each change. An output is one unless it is turned off. Those that say what is
+    // selected, what the cursor is at and what the node answered change only when the user acts, and that of a
+    // recording only at its start and its end.
     let regions = "[...document.querySelectorAll('output, [aria-live], [role=status]')]        .filter(one => one.ariaLive !== 'off').map(one => one.id).join()";
     assert_eq!(
         rig.tab.evaluate(regions),
-        "banner,notices,recording-said,inspect-said,plot-said,hashes"
+        "banner,notices,recording-said,inspect-said,command-answer,plot-said,hashes"
     );
     assert!(rig.tab.number("document.querySelectorAll('#plots output').length") > 3.0);
 }

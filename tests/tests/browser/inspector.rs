@@ -145,3 +145,46 @@ fn keys_select_and_the_view_follows_while_the_plots_record_the_selection() {
     rig.tab.named_key("Escape");
     assert_eq!(selected(&rig.tab), json!([]));
 }
+
+#[test]
+#[ignore = "needs Chromium"]
+fn a_command_by_hand_is_sent_and_answered() {
+    let mut rig = Rig::with_scene(SCENE, &["--paused", "--as-fast-as-possible"], "");
+    rig.settled();
+    let tab = &rig.tab;
+    tab.evaluate(
+        "void document.querySelector('#command-form').closest('details').setAttribute('open', '')",
+    );
+    let give = |command: &str, fields: &[&str]| {
+        let fields = json!(fields);
+        tab.evaluate(&format!(
+            "void (() => {{ \
+                const choice = document.querySelector('#command'); \
+                choice.value = '{command}'; \
+                choice.dispatchEvent(new Event('change')); \
+                const inputs = document.querySelectorAll('#command-fields input'); \
+                {fields}.forEach((text, index) => {{ inputs[index].value = text; }}); \
+                document.querySelector('#command-send').click(); \
+            }})()"
+        ));
+    };
+    let answers = |start: &str| {
+        tab.wait(&format!(
+            "document.querySelector('#command-answer').textContent.startsWith({start:?})"
+        ));
+    };
+    give("push", &["1 0 0", "0.1", "0 0.25 0"]);
+    answers("Applied in step ");
+    give("pin", &["1"]);
+    answers("Applied in step ");
+    give("pin", &["99"]);
+    answers("the scene has no such particle");
+    give("drive_body", &["3", "0 1 0"]);
+    answers("the scene has no such collider");
+    give("cut_radius", &["0 0", "1"]);
+    answers("center: \"0 0\" is not 3 numbers");
+    rig.step(1);
+    rig.tab.wait("viewer.pins.some(([particle]) => particle === 1)");
+    let pushed = rig.wait_for_state("the push", |state| state.particles[2].velocity[1] > 0.0);
+    assert!(pushed.particles[2].velocity[0].abs() < 1e-6);
+}

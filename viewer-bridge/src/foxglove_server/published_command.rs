@@ -2,7 +2,7 @@
 
 use sim_contract::Action;
 
-use crate::message::Command;
+use crate::message::{BodyDrive, Command};
 
 /// Topic of published commands.
 pub(super) const TOPIC: &str = "/commands";
@@ -49,7 +49,23 @@ pub fn parse(payload: &[u8], epoch: u32) -> Result<Command, String> {
             Command::Push { center, radius, delta, limit }
         }
         Action::Rewind { .. } => return Err("rewind is not accepted here".to_owned()),
-        Action::DriveBody { .. } => return Err("drive_body is not accepted here".to_owned()),
+        Action::DriveBody {
+            collider,
+            translation,
+            rotation,
+            velocity,
+            angular_velocity,
+            force,
+            torque,
+        } => Command::DriveBody(BodyDrive {
+            collider,
+            translation,
+            rotation,
+            velocity,
+            angular_velocity,
+            force,
+            torque,
+        }),
         Action::Restore { .. } => return Err("restore is not accepted here".to_owned()),
         Action::Unknown { .. } => return Err("no such command".to_owned()),
     })

@@ -3,6 +3,7 @@
 use sim_contract::{COORDINATE_MAX, ParameterValue, Reason, Text};
 use sim_solver::GRAB_OVER_S_MAX;
 
+use super::body_drive::BodyDrive;
 use super::from_page::Command;
 use crate::limits::{CONSTRAINTS_PER_CUT_MAX, STEPS_AT_ONCE_MAX};
 
@@ -48,6 +49,7 @@ pub fn check(command: &Command) -> Result<(), Reason> {
             numbers(rotation)?;
             direction(rotation)
         }
+        Command::DriveBody(drive) => drive_body(drive),
         Command::Step { count: 0 } => Err(Reason::OutOfRange),
         Command::Step { count } => {
             at_most(count.unsigned_abs() as usize, STEPS_AT_ONCE_MAX as usize)
@@ -78,6 +80,13 @@ pub fn check(command: &Command) -> Result<(), Reason> {
         | Command::Seek { .. }
         | Command::Loop { .. } => Ok(()),
     }
+}
+
+fn drive_body(drive: &BodyDrive) -> Result<(), Reason> {
+    let BodyDrive { translation, velocity, angular_velocity, force, torque, .. } = drive;
+    points(&[*translation, *velocity, *angular_velocity, *force, *torque])?;
+    numbers(&drive.rotation)?;
+    direction(&drive.rotation)
 }
 
 fn at_most(count: usize, max: usize) -> Result<(), Reason> {

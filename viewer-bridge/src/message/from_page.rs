@@ -6,6 +6,7 @@ use serde_json::{Map, Value};
 use sim_contract::{GRAB_OVER_S_DEFAULT, KindFilter, ParameterValue};
 use thiserror::Error;
 
+use super::body_drive::{BodyDrive, no_rotation};
 use super::timeline::Toward;
 use crate::limits::PARTICLES_INSPECTED_MAX;
 
@@ -141,6 +142,7 @@ pub enum Command {
         #[serde(default = "no_rotation")]
         rotation: [f32; 4],
     },
+    DriveBody(BodyDrive),
     MoveAnchor {
         anchor: u32,
         translation: [f32; 3],
@@ -201,10 +203,6 @@ fn over_s_default() -> f32 {
     GRAB_OVER_S_DEFAULT
 }
 
-fn no_rotation() -> [f32; 4] {
-    [0.0, 0.0, 0.0, 1.0]
-}
-
 fn one() -> i32 {
     1
 }
@@ -224,6 +222,7 @@ impl Command {
             Self::CutSegment { .. } => "cut_segment",
             Self::CutRadius { .. } => "cut_radius",
             Self::MoveCollider { .. } => "move_collider",
+            Self::DriveBody(_) => "drive_body",
             Self::MoveAnchor { .. } => "move_anchor",
             Self::Pause {} => "pause",
             Self::Resume {} => "resume",

@@ -131,7 +131,7 @@ fn to_page_of_a_replay() -> Vec<ToPage> {
 }
 
 /// One message of each kind that a page may send.
-const FROM_PAGE: [&str; 35] = [
+const FROM_PAGE: [&str; 37] = [
     r#"{"type":"hello","protocol":2,"token":"00","format":"u16"}"#,
     r#"{"type":"hello","protocol":2}"#,
     r#"{"type":"ack","frame":77}"#,
@@ -167,6 +167,8 @@ const FROM_PAGE: [&str; 35] = [
     r#"{"type":"seek","step":1200}"#,
     r#"{"type":"rate","value":0.5}"#,
     r#"{"type":"loop","is_on":true}"#,
+    r#"{"type":"loop","is_on":true,"first_step":240,"last_step":480}"#,
+    r#"{"type":"drive_body","collider":0,"translation":[0.5,0,0],"velocity":[0,-1,0],"force":[0,0,2]}"#,
 ];
 
 #[test]

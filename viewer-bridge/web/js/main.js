@@ -4,6 +4,7 @@ import { Banner, sentence } from "./ui/banner.js";
 import { Camera } from "./geometry/camera.js";
 import { Charts } from "./panel/charts.js";
 import { ColorLegend } from "./legend/color-legend.js";
+import { CommandForm } from "./panel/command-form.js";
 import { Commands } from "./net/commands.js";
 import { Controls } from "./ui/controls.js";
 import { find } from "./ui/dom.js";
@@ -114,6 +115,7 @@ function start(renderer) {
   controls.onInspect = () => inspector.turn();
   controls.onFollow = () => inspector.toggleFollow();
   const charts = new Charts(app, banner);
+  new CommandForm(app);
   new Hint(app, input);
   const forceLegend = new ForceLegend(app);
   const colorLegend = new ColorLegend(app);

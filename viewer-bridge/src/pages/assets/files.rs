@@ -39,6 +39,8 @@ pub(super) const FILES: &[(&str, &[u8])] = files![
     "js/net/socket.js",
     "js/net/wire.js",
     "js/panel/charts.js",
+    "js/panel/command-fields.js",
+    "js/panel/command-form.js",
     "js/panel/csv.js",
     "js/panel/inspector.js",
     "js/panel/panel.js",

@@ -42,6 +42,7 @@ pub(super) fn actions(
         Command::MoveCollider { collider, translation, rotation } => {
             Action::MoveCollider { collider, translation, rotation }
         }
+        Command::DriveBody(drive) => drive.action(),
         Command::MoveAnchor { anchor, translation, rotation } => {
             Action::MoveAnchor { anchor, translation, rotation }
         }

@@ -1,0 +1,63 @@
+// Commands by hand: a choice of the command, a field for each of its values, and the answer of the node.
+
+import { enable, find, make } from "../ui/dom.js";
+import { COMMANDS, messageOf } from "./command-fields.js";
+
+export class CommandForm {
+  /** @param {import("../tools/tool.js").App} app */
+  constructor(app) {
+    this.app = app;
+    this.form = find("command-form", HTMLFormElement);
+    this.choice = find("command", HTMLSelectElement);
+    this.rows = find("command-fields", HTMLElement);
+    this.send = find("command-send", HTMLButtonElement);
+    this.answer = find("command-answer", HTMLOutputElement);
+    /** @type {HTMLInputElement[]} */
+    this.inputs = [];
+    /** The texts per field, which other commands share. @type {Map<string, string>} */
+    this.texts = new Map();
+    this.choice.append(...Object.keys(COMMANDS).map((name) => make("option", { value: name }, name)));
+    this.choice.addEventListener("change", () => this.build());
+    this.form.addEventListener("submit", (event) => {
+      event.preventDefault();
+      this.submit();
+    });
+    for (const topic of /** @type {const} */ (["node", "connection", "hello"])) app.simulation.on(topic, () => this.update());
+    this.build();
+    this.update();
+  }
+
+  build() {
+    this.inputs = COMMANDS[this.choice.value].map(({ name, example, isOptional }) => {
+      const input = make("input", { type: "text", class: "value", placeholder: isOptional ? `${example} (optional)` : example, autocomplete: "off", spellcheck: "false" });
+      input.value = this.texts.get(name) ?? "";
+      input.addEventListener("input", () => this.texts.set(name, input.value));
+      return input;
+    });
+    this.rows.replaceChildren(...this.inputs.map((input, index) => make("label", {}, make("span", {}, COMMANDS[this.choice.value][index].name), input)));
+    this.answer.textContent = "";
+  }
+
+  update() {
+    const { isReplay, isConnected, isAlive } = this.app.simulation;
+    const reason = isReplay ? "A recording cannot be changed." : !isConnected ? "There is no connection to the bridge." : isAlive ? "" : "No node is running.";
+    enable(this.send, reason);
+  }
+
+  submit() {
+    const { simulation, commands } = this.app;
+    const command = this.choice.value;
+    const message = messageOf(command, this.inputs.map(({ value }) => value), simulation.scene?.epoch ?? 0);
+    if ("fault" in message) return this.say(message.fault, true);
+    commands.run(command, message.fields, ({ status, step, applied, text, reason }) => {
+      if (status === "applied") this.say(step === null ? "Nothing to do." : `Applied in step ${step}${applied > 1 ? ` (${applied} parts)` : ""}.`, false);
+      else this.say(text || reason, true);
+    });
+  }
+
+  /** @param {string} text @param {boolean} isWrong */
+  say(text, isWrong) {
+    this.answer.textContent = text;
+    this.answer.classList.toggle("is-wrong", isWrong);
+  }
+}
