@@ -65,7 +65,7 @@ fn scrubbing_a_recording_shows_the_recorded_positions() {
 
 #[test]
 #[ignore = "needs Chromium"]
-fn the_clock_of_a_timeline_counts_from_the_begin_of_its_file() {
+fn the_clock_of_a_timeline_starts_at_zero_with_its_file() {
     let sandbox = Sandbox::new();
     let file = sandbox.path("run.mcap");
     let node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
