@@ -60,7 +60,7 @@ pub(crate) struct Args {
     #[arg(long)]
     token: bool,
     /// Recording to show instead of a node, written by `recorder record` or `recorder simulate`; an
-    /// incomplete file is shown as far as it goes. Of a folder, the newest one, and pages can open the others
+    /// incomplete file is shown as far as it goes. For a folder, the newest recording is shown, and pages can open the others
     #[arg(long, value_name = "FILE.mcap or DIR", conflicts_with_all = ["name", "domain"])]
     pub(crate) replay: Option<PathBuf>,
     /// Play the recording at once, again and again, for viewers that cannot control the playback. Pages

@@ -85,9 +85,7 @@ fn run(args: &Args) -> anyhow::Result<()> {
 
 fn open_source(args: &Args, stop: &Stop) -> anyhow::Result<Box<dyn Source>> {
     if let Some(path) = &args.replay {
-        let newest =
-            path.is_dir().then(|| newest_recording(path).ok_or_else(|| no_recording(path)));
-        let path = newest.transpose()?.unwrap_or_else(|| path.clone());
+        let path = if path.is_dir() { newest_in(path)? } else { path.clone() };
         return Ok(Box::new(Replay::open(&path, args.start(), stop, &mut note)?));
     }
     let mut catalog = Catalog::default();
@@ -95,12 +93,17 @@ fn open_source(args: &Args, stop: &Stop) -> anyhow::Result<Box<dyn Source>> {
     Ok(Box::new(Live::new(args.endpoint()?, catalog)))
 }
 
-fn no_recording(folder: &Path) -> anyhow::Error {
-    anyhow!(
-        "{}: has no recording (*.mcap); give a file written by `recorder record` or `recorder simulate`, or a \
-         folder of them",
-        folder.display()
-    )
+/// Returns the newest recording in a folder.
+fn newest_in(folder: &Path) -> anyhow::Result<PathBuf> {
+    let newest = newest_recording(folder);
+    let newest = newest.with_context(|| format!("{}: cannot read the folder", folder.display()))?;
+    newest.with_context(|| {
+        format!(
+            "{}: has no recording (*.mcap); give a file written by `recorder record` or `recorder simulate`, or \
+             a folder of them",
+            folder.display()
+        )
+    })
 }
 
 /// The servers, and the recordings of their pages.

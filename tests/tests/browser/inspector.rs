@@ -178,9 +178,11 @@ fn a_command_by_hand_is_sent_and_answered() {
     give("pin", &["1"]);
     answers("Applied in step ");
     give("pin", &["99"]);
-    answers("the scene has no such particle");
+    answers("The scene has no such particle");
     give("drive_body", &["3", "0 1 0"]);
-    answers("the scene has no such collider");
+    answers("The scene has no such collider");
+    give("pin", &["4294967296"]);
+    answers("particle: \"4294967296\" is not a whole number");
     give("cut_radius", &["0 0", "1"]);
     answers("center: \"0 0\" is not 3 numbers");
     rig.step(1);

@@ -76,11 +76,12 @@ fn the_clock_of_a_timeline_starts_at_zero_with_its_file() {
     };
     wait_for_step(240);
     let recording = record(&sandbox, &file);
-    wait_for_step(480);
+    let begun = ctl(&sandbox, &["status"])["step"].as_u64().unwrap();
+    wait_for_step(begun + 240);
     recording.interrupt().success();
     node.interrupt();
     let replay = ReplayRig::open(sandbox, &file, "");
-    replay.tab.wait("document.querySelector('#clock').textContent.startsWith('0:00.000 / 0:0')");
+    replay.tab.wait("document.querySelector('#clock').textContent.startsWith('0:00.000 / ')");
     let first = replay.tab.number("viewer.step");
     assert!(first > 240.0);
     replay.tab.key('.');
@@ -120,14 +121,28 @@ fn a_timeline_goes_from_mark_to_mark_zooms_and_repeats_a_part() {
     // Zoomed, the mark on show is where the slider is; pointing at it names the command.
     tab.evaluate("void (document.querySelector('#zoom').value = '0.5', document.querySelector('#zoom').dispatchEvent(new Event('change')))");
     tab.wait("document.querySelector('#seek').max - document.querySelector('#seek').min === 120");
-    let place = tab.number(
-        "(slider => (slider.value - slider.min) / (slider.max - slider.min))(document.querySelector('#seek'))",
-    );
-    tab.move_to(tab.pixel("#marks", place));
+    let points_at = |step: u64, text: &str| {
+        let place = tab.number(
+            "(slider => (slider.value - slider.min) / (slider.max - slider.min))(document.querySelector('#seek'))",
+        );
+        tab.move_to(tab.pixel("#marks", place));
+        tab.wait(&format!(
+            "document.querySelector('#marks').title.includes('step {step}: {text}')"
+        ));
+    };
+    points_at(marked, "mark: slips");
+    // A jump beyond the zoomed part moves it.
+    tab.key('<');
     tab.wait(&format!(
-        "document.querySelector('#marks').title.includes('step {marked}: mark: slips')"
+        "viewer.step === {pinned} && document.querySelector('#seek').max < {marked}"
     ));
-    for (turn, length) in [(1, 480), (-1, 120)] {
+    points_at(pinned, "pin");
+    tab.key('>');
+    tab.wait(&format!(
+        "viewer.step === {marked} && document.querySelector('#seek').max > {marked}"
+    ));
+    points_at(marked, "mark: slips");
+    for (turn, length) in [(100, 480), (-100, 120)] {
         tab.evaluate(&format!("void document.querySelector('#track').dispatchEvent(new WheelEvent('wheel', {{ deltaY: {turn}, bubbles: true, cancelable: true }}))"));
         tab.wait(&format!(
             "{length} === document.querySelector('#seek').max - document.querySelector('#seek').min"

@@ -194,7 +194,7 @@ impl Page {
     }
 
     /// Sends a command that must be applied, and returns a frame that matches. The frame can come before
-    /// the outcome, and no other may follow it.
+    /// the outcome, and may be the last one.
     pub(crate) fn frame_after(
         &mut self,
         message: Value,

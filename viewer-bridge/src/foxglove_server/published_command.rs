@@ -85,6 +85,18 @@ mod tests {
         let text = r#"{"kind":"grab","particle":1,"target":[0,1,2],"over_s":0.1}"#;
         assert_eq!(read(text), Ok(grab));
         assert_eq!(read(r#"{"kind":"pause"}"#), Ok(Command::Pause {}));
+        let drive = BodyDrive {
+            collider: 2,
+            translation: [1.0, 0.0, 0.0],
+            rotation: [0.0, 1.0, 0.0, 0.0],
+            velocity: [2.0, 0.0, 0.0],
+            angular_velocity: [3.0, 0.0, 0.0],
+            force: [4.0, 0.0, 0.0],
+            torque: [5.0, 0.0, 0.0],
+        };
+        let text = serde_json::to_string(&drive.action()).unwrap();
+        assert!(text.contains(r#""force":[4"#) && text.contains(r#""torque":[5"#), "{text}");
+        assert_eq!(read(&text), Ok(Command::DriveBody(drive)));
         let push = Command::Push {
             center: [0.0, 1.0, 2.0],
             radius: 0.5,

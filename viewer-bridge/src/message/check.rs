@@ -84,7 +84,10 @@ pub fn check(command: &Command) -> Result<(), Reason> {
 
 fn drive_body(drive: &BodyDrive) -> Result<(), Reason> {
     let BodyDrive { translation, velocity, angular_velocity, force, torque, .. } = drive;
-    points(&[*translation, *velocity, *angular_velocity, *force, *torque])?;
+    points(&[*translation, *velocity, *angular_velocity])?;
+    if !force.iter().chain(torque).all(|axis| axis.is_finite()) {
+        return Err(Reason::NonFinite);
+    }
     numbers(&drive.rotation)?;
     direction(&drive.rotation)
 }
@@ -136,6 +139,8 @@ mod tests {
             r#"{"type":"cut_segment","from":[0,0,0],"to":[1,0,0],"direction":[0,0,0]}"#,
             r#"{"type":"cut_radius","center":[0,0,0],"radius":-0.1}"#,
             r#"{"type":"move_collider","collider":0,"translation":[0,0,0],"rotation":[0,0,0,0]}"#,
+            r#"{"type":"drive_body","collider":0,"translation":[0,0,0],"rotation":[0,0,0,0]}"#,
+            r#"{"type":"drive_body","collider":0,"translation":[0,2e7,0]}"#,
             r#"{"type":"step","count":0}"#,
             r#"{"type":"step","count":10001}"#,
             r#"{"type":"rate","value":11}"#,
@@ -151,6 +156,7 @@ mod tests {
     fn numbers_that_are_not_finite_are_refused() {
         for text in [
             r#"{"type":"grab","particle":1,"target":[0,1e39,0]}"#,
+            r#"{"type":"drive_body","collider":0,"translation":[0,0,0],"torque":[0,0,1e39]}"#,
             r#"{"type":"set","parameter":"gravity","value":[0,"nan",0]}"#,
             r#"{"type":"set","parameter":"damping","value":"inf"}"#,
         ] {

@@ -41,20 +41,20 @@ pub struct Mark {
     pub step: u64,
     /// Number of events.
     pub count: u32,
-    /// The commands among them, each kind once, in the order of their first; at most
-    /// [`COMMANDS_PER_MARK_MAX`]. The text of a `mark` follows its name.
+    /// The distinct commands among them, in order of first occurrence; at most
+    /// [`COMMANDS_PER_MARK_MAX`]. A `mark` includes its text.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub commands: Vec<String>,
 }
 
 impl Mark {
-    /// `count` events that are no commands.
+    /// A mark of `count` events other than commands.
     pub(crate) fn new(kind: MarkKind, step: u64, count: u32) -> Self {
         Self { kind, step, count, commands: Vec::new() }
     }
 
     /// An applied command.
-    pub(crate) fn of_action(action: &Action, step: u64) -> Self {
+    pub(crate) fn from_action(action: &Action, step: u64) -> Self {
         let kind = match action {
             Action::Pin { .. } | Action::Unpin { .. } => MarkKind::Pin,
             _ => MarkKind::Command,

@@ -98,7 +98,7 @@ impl Connection {
     /// Returns the newest frame for the page. Reports a missed frame once.
     pub(crate) fn next_frame(&mut self) -> NextFrame {
         let frame = Arc::clone(&self.frames.borrow_and_update());
-        let encoded = match frame.traits.format_for(self.choice) {
+        let encoded = match frame.properties.format_for(self.choice) {
             Format::F32 => &frame.f32,
             Format::U16 => &frame.u16,
         };

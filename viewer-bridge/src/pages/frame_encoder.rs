@@ -3,7 +3,7 @@
 use bytes::Bytes;
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
 
-use super::frame_set::{ColliderSet, Formats, FrameSet, Traits};
+use super::frame_set::{ColliderSet, Formats, FrameProperties, FrameSet};
 use crate::sink::State;
 use crate::wire::convert::{microseconds, to_f32};
 use crate::wire::{
@@ -78,7 +78,7 @@ impl FrameEncoder {
         let encode = |format| encode_frame(&head, state.particles, format, &self.limits);
         let frame = FrameSet {
             number: head.number,
-            traits: Traits::of(state),
+            properties: FrameProperties::from_state(state),
             f32: formats.f32.then(|| encode(Format::F32)),
             u16: formats.u16.then(|| encode(Format::U16)),
             colliders: self.colliders.clone(),

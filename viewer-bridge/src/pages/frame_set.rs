@@ -13,7 +13,7 @@ pub(crate) struct FrameSet {
     /// Number of the frame; ascending.
     pub(crate) number: u32,
     /// The properties that decide the format of each page.
-    pub(crate) traits: Traits,
+    pub(crate) properties: FrameProperties,
     /// FRAME f32.
     pub(crate) f32: Option<Bytes>,
     /// FRAME u16.
@@ -72,15 +72,15 @@ impl Formats {
 
 /// The properties of a state that decide the format in which a page receives it.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Traits {
+pub(crate) struct FrameProperties {
     /// Number of particles.
     pub(crate) particle_count: usize,
     /// Nothing moves until the next command.
     pub(crate) is_paused: bool,
 }
 
-impl Traits {
-    pub(super) fn of(state: &State<'_>) -> Self {
+impl FrameProperties {
+    pub(super) fn from_state(state: &State<'_>) -> Self {
         let is_paused = state.flags & frame_flag::PAUSED != 0;
         Self { particle_count: state.particles.len(), is_paused }
     }

@@ -87,7 +87,7 @@ impl History {
     /// Marks the step of an applied command.
     pub(super) fn add_outcome(&mut self, row: &OutcomeRow) {
         if row.is_applied() {
-            self.add_mark(Mark::of_action(&row.action, row.step));
+            self.add_mark(Mark::from_action(&row.action, row.step));
         }
     }
 
@@ -197,7 +197,7 @@ impl PastState {
         let tear = around.tear.clone().unwrap_or_else(nothing);
         let pins = around.pins.clone().unwrap_or_else(free);
         let colliders = frame.colliders.as_ref().map(|colliders| colliders.bytes.clone());
-        let (wanted, other) = match frame.traits.format_for(page.choice) {
+        let (wanted, other) = match frame.properties.format_for(page.choice) {
             Format::F32 => (&frame.f32, &frame.u16),
             Format::U16 => (&frame.u16, &frame.f32),
         };

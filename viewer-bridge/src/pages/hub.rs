@@ -17,7 +17,7 @@ use tokio::sync::{mpsc, watch};
 use super::connection::{Connection, Credit, SentFrames, Wishes};
 use super::frame_encoder::{FrameEncoder, Wanted};
 pub use super::frame_set::Formats;
-use super::frame_set::{FrameSet, Traits};
+use super::frame_set::{FrameProperties, FrameSet};
 use super::history::{History, PastMessages, Viewer};
 use super::recordings::file_name::names_in;
 use crate::limits::{PROTOCOL, RELIABLE_QUEUED_MAX};
@@ -135,10 +135,10 @@ impl Hub {
 
     /// Returns the formats in which pages with credit wait for this state.
     pub fn awaited_formats(&self, state: &State<'_>) -> Formats {
-        let traits = Traits::of(state);
+        let properties = FrameProperties::from_state(state);
         let mut formats = Formats::default();
         for page in lock(&self.state).pages.values().filter(|page| page.credit.is_left()) {
-            formats.add(traits.format_for(page.choice));
+            formats.add(properties.format_for(page.choice));
         }
         formats
     }
@@ -261,6 +261,7 @@ impl Hub {
     pub(crate) fn join(&self, choice: Choice) -> Connection {
         let (queue, receiver) = mpsc::channel(RELIABLE_QUEUED_MAX);
         let credit = Arc::new(Credit::default());
+        let recordings = self.folder.as_deref().map(names_in).unwrap_or_default();
         let mut state = lock(&self.state);
         if state.pages.is_empty() {
             // Frames before a pause without pages are not part of the rate.
@@ -269,7 +270,7 @@ impl Hub {
         state.last_number += 1;
         let number = state.last_number;
         let client = ClientId::Page(number);
-        let welcome = text(&ToPage::Hello(Box::new(self.welcome(number, choice))));
+        let welcome = text(&ToPage::Hello(Box::new(self.welcome(number, choice, recordings))));
         for message in std::iter::once(&welcome).chain(state.latched.values()) {
             // The queue has room for all of them.
             let _queued = queue.try_send(message.clone());
@@ -287,7 +288,7 @@ impl Hub {
         Connection { client, choice, queue: receiver, frames, credit, wishes, sent }
     }
 
-    fn welcome(&self, client: u32, format: Choice) -> Welcome {
+    fn welcome(&self, client: u32, format: Choice, recordings: Vec<String>) -> Welcome {
         Welcome {
             protocol: PROTOCOL,
             version: env!("CARGO_PKG_VERSION"),
@@ -295,7 +296,7 @@ impl Hub {
             mode: self.mode,
             format,
             scenes: self.scenes.clone(),
-            recordings: self.folder.as_deref().map(names_in).unwrap_or_default(),
+            recordings,
             limits: PageLimits::default(),
         }
     }

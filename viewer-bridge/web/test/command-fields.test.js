@@ -23,14 +23,17 @@ test("values are numbers, vectors, texts or off", () => {
 
 test("a wrong value is named with an example", () => {
   const faults = [
-    ["pin", [""], "particle: is missing (such as 0)"],
-    ["pin", ["-1"], 'particle: "-1" is not a whole number (such as 0)'],
-    ["pin", ["1.5"], 'particle: "1.5" is not a whole number (such as 0)'],
-    ["cut_radius", ["0 1", "1"], 'center: "0 1" is not 3 numbers (such as 0 1 0)'],
-    ["cut_radius", ["0 1 x", "1"], 'center: "0 1 x" is not 3 numbers (such as 0 1 0)'],
-    ["cut_radius", ["0 1 0", "wide"], 'radius: "wide" is not a number (such as 0.2)'],
-    ["move_anchor", ["0", "0 0 0", "1 0 0"], 'rotation: "1 0 0" is not 4 numbers (such as 0 0 0 1)'],
-    ["set", ["damping", "1 2", ""], 'value: "1 2" is not a number, three numbers or off (such as 0.5)'],
+    ["pin", [""], "particle: missing (for example 0)"],
+    ["pin", ["-1"], 'particle: "-1" is not a whole number up to 4294967295 (for example 0)'],
+    ["pin", ["1.5"], 'particle: "1.5" is not a whole number up to 4294967295 (for example 0)'],
+    ["pin", ["4294967296"], 'particle: "4294967296" is not a whole number up to 4294967295 (for example 0)'],
+    ["step", ["3000000000"], 'count: "3000000000" is not a whole number up to 2147483647 (for example 1)'],
+    ["rewind", ["1e20"], 'to_step: "1e20" is not a whole number up to 9007199254740991 (for example 0)'],
+    ["cut_radius", ["0 1", "1"], 'center: "0 1" is not 3 numbers (for example 0 1 0)'],
+    ["cut_radius", ["0 1 x", "1"], 'center: "0 1 x" is not 3 numbers (for example 0 1 0)'],
+    ["cut_radius", ["0 1 0", "wide"], 'radius: "wide" is not a number (for example 0.2)'],
+    ["move_anchor", ["0", "0 0 0", "1 0 0"], 'rotation: "1 0 0" is not 4 numbers (for example 0 0 0 1)'],
+    ["set", ["damping", "1 2", ""], 'value: "1 2" is not a number, three numbers or off (for example 0.5)'],
   ];
   for (const [command, texts, fault] of faults) assert.deepEqual(messageOf(command, texts, 3), { fault });
 });

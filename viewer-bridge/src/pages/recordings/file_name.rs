@@ -1,9 +1,9 @@
 //! Names of recordings. A page never chooses a path: the bridge names what it writes, and opens only names
 //! in its own folder.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, UNIX_EPOCH};
+use std::{fs, io};
 
 use sim_contract::part_path;
 
@@ -42,16 +42,16 @@ pub(super) fn name_of(path: &Path) -> Option<String> {
     path.file_stem().and_then(|stem| stem.to_str()).map(str::to_owned)
 }
 
-/// Returns whether a text names a file in a folder, and no place outside.
+/// Returns whether `name` is a valid name of a recording: a single path component that is not hidden.
 fn is_name(name: &str) -> bool {
-    let is_letter = |letter: char| !letter.is_control() && letter != '/' && letter != '\\';
+    let is_allowed = |letter: char| !letter.is_control() && letter != '/' && letter != '\\';
     !name.is_empty()
         && name.len() <= NAME_LENGTH_MAX
         && !name.starts_with('.')
-        && name.chars().all(is_letter)
+        && name.chars().all(is_allowed)
 }
 
-/// Returns the file of a name in the folder; `None` if it is not a plain name.
+/// Returns the path of the recording `name` in the folder; `None` if the name is not valid.
 pub(in crate::pages) fn path_of(folder: &Path, name: &str) -> Option<PathBuf> {
     is_name(name).then(|| folder.join(format!("{name}.{ENDING}")))
 }
@@ -73,9 +73,12 @@ pub(in crate::pages) fn names_in(folder: &Path) -> Vec<String> {
 }
 
 /// Returns the newest recording in a folder.
-pub fn newest_recording(folder: &Path) -> Option<PathBuf> {
-    let names = names_in(folder);
-    names.first().and_then(|name| path_of(folder, name))
+///
+/// # Errors
+/// The folder cannot be read.
+pub fn newest_recording(folder: &Path) -> io::Result<Option<PathBuf>> {
+    fs::read_dir(folder)?;
+    Ok(names_in(folder).first().and_then(|name| path_of(folder, name)))
 }
 
 #[cfg(test)]
@@ -133,10 +136,11 @@ mod tests {
             let file = fs::File::create(folder.join(name)).unwrap();
             file.set_modified(begin - Duration::from_secs(age_s)).unwrap();
         }
-        let (names, newest) = (names_in(&folder), newest_recording(&folder));
+        let (names, newest) = (names_in(&folder), newest_recording(&folder).unwrap());
         fs::remove_dir_all(&folder).unwrap();
         assert_eq!(names, ["é 2", "b", "old"]);
         assert_eq!(newest, Some(folder.join("é 2.mcap")));
-        assert_eq!((names_in(&folder), newest_recording(&folder)), (Vec::new(), None));
+        assert_eq!(names_in(&folder), Vec::<String>::new());
+        assert!(newest_recording(&folder).is_err());
     }
 }

@@ -259,7 +259,7 @@ fn a_state_of_another_size_is_neither_shown_nor_measured() {
     fixture.publish(1, 0, 1);
     fixture.read();
     fixture.link.publish_statistics(&fixture.shown, &fixture.sinks);
-    assert_eq!(fixture.page.frames.borrow().traits.particle_count, 2);
+    assert_eq!(fixture.page.frames.borrow().properties.particle_count, 2);
     // It does not begin a load either.
     fixture.owner.load(&load(2, 1)).unwrap();
     fixture.publish(2, 1, 1);

@@ -119,7 +119,7 @@ impl Check {
 
     fn add_outcome(&mut self, row: &OutcomeRow) {
         if row.is_applied() {
-            self.marks.add(Mark::of_action(&row.action, row.step));
+            self.marks.add(Mark::from_action(&row.action, row.step));
         }
     }
 

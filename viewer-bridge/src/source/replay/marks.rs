@@ -101,9 +101,9 @@ mod tests {
         let mark = |text| Action::Mark { text: Text::cut(text) };
         let (cut, set) = (Action::Cut { constraint: 3 }, Action::Reset);
         for action in [cut, set, cut, mark("slips"), mark("holds"), mark("slips")] {
-            marks.add(Mark::of_action(&action, 5));
+            marks.add(Mark::from_action(&action, 5));
         }
-        marks.add(Mark::of_action(&Action::Pin { particle: 1 }, 5));
+        marks.add(Mark::from_action(&Action::Pin { particle: 1 }, 5));
         let commands: Vec<_> = marks.list().into_iter().map(|mark| mark.commands).collect();
         let others = ["cut", "reset", "mark: slips", "mark: holds"];
         assert_eq!(commands, [["pin"].to_vec(), others.to_vec()]);

@@ -115,12 +115,14 @@ impl Playhead {
 
     /// Plays to the end of the recording, and pauses there.
     pub(super) fn stop_looping(&mut self, now_ns: u64) {
+        self.advance(now_ns);
         self.go_to(self.step(now_ns), now_ns);
         (self.is_looping, self.looped) = (false, [self.first_step, self.last_step]);
     }
 
     /// Pauses at the present place.
     pub(super) fn pause(&mut self, now_ns: u64) {
+        self.advance(now_ns);
         self.go_to(self.step(now_ns), now_ns);
         self.is_playing = false;
     }
@@ -137,8 +139,11 @@ impl Playhead {
         self.is_playing = true;
     }
 
-    /// Moves to a step.
+    /// Moves to a step. While a loop plays, a step after it is its first.
     pub(super) fn go_to(&mut self, step: u64, now_ns: u64) {
+        let [first_step, last_step] = self.looped;
+        let is_beyond = self.is_playing && self.is_looping && step > last_step;
+        let step = if is_beyond { first_step } else { step };
         self.base_step = step as f64;
         self.base_ns = now_ns;
     }
@@ -221,12 +226,16 @@ mod tests {
         head.resume(0);
         assert_eq!((head.advance(ms(95)), head.step(ms(95))), (Advanced::Within, 69));
         assert_eq!((head.advance(ms(325)), head.step(ms(325))), (Advanced::ToEnd, 62));
-        // A seek beyond the loop returns to it.
-        head.go_to(140, ms(330));
-        assert_eq!((head.advance(ms(330)), head.step(ms(330))), (Advanced::ToEnd, 60));
+        // A seek beyond the loop returns to its first step.
+        head.go_to(143, ms(330));
+        assert_eq!((head.advance(ms(330)), head.step(ms(330))), (Advanced::Within, 60));
+        // A pause stays within it, however late it comes.
+        head.pause(ms(330 + 135));
+        assert_eq!(head.step(ms(500)), 63);
+        head.resume(ms(500));
         assert!(!head.loop_between(Some(70), Some(69), ms(330)));
         assert!(!head.loop_between(Some(151), None, ms(330)));
-        head.stop_looping(ms(335));
+        head.stop_looping(ms(505));
         assert_eq!((head.loop_steps(), head.is_looping), (None, false));
         assert_eq!((head.advance(ms(2000)), head.step(ms(2000))), (Advanced::ToEnd, 150));
         assert!(head.loop_between(Some(150), Some(9999), ms(2000)));

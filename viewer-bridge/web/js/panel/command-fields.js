@@ -1,6 +1,6 @@
 // The commands that a user can give by hand, with their fields (PROTOCOL.md, section 4), and how a typed text becomes a value.
 
-/** @typedef {"index" | "count" | "number" | "vector" | "rotation" | "text" | "value"} Form */
+/** @typedef {"index" | "count" | "step" | "number" | "vector" | "rotation" | "text" | "value"} Form */
 /** @typedef {{ name: string, form: Form, example: string, isOptional?: boolean }} Field */
 
 /** @type {Field} */
@@ -32,7 +32,7 @@ export const COMMANDS = {
   drive_body: [COLLIDER, ...POSE, ...["velocity", "angular_velocity", "force", "torque"].map((name) => (/** @type {Field} */ ({ name, form: "vector", example: "0 0 0", isOptional: true })))],
   set: [{ name: "parameter", form: "text", example: "damping" }, { name: "value", form: "value", example: "0.5" }, { name: "constraint_kind", form: "text", example: "structural", isOptional: true }],
   step: [{ name: "count", form: "count", example: "1" }],
-  rewind: [{ name: "to_step", form: "count", example: "0" }],
+  rewind: [{ name: "to_step", form: "step", example: "0" }],
   load: [{ name: "scene", form: "text", example: "curtain" }],
   mark: [{ name: "text", form: "text", example: "it slips" }],
   reset: [],
@@ -42,8 +42,10 @@ export const COMMANDS = {
 
 /** Numbers per form. @type {Partial<Record<Form, number>>} */
 const LENGTHS = { vector: 3, rotation: 4 };
+/** Largest number per form. @type {Partial<Record<Form, number>>} */
+const LARGEST = { index: 2 ** 32 - 1, count: 2 ** 31 - 1, step: Number.MAX_SAFE_INTEGER };
 
-/** Reads the numbers in a text, separated by spaces or commas. Null if one is none. @param {string} text */
+/** Reads the numbers in a text, separated by spaces or commas. Null if a part is not a number. @param {string} text */
 function numbers(text) {
   const parts = text.split(/[\s,]+/).filter((part) => part !== "").map(Number);
   return parts.every(Number.isFinite) ? parts : null;
@@ -52,7 +54,7 @@ function numbers(text) {
 /** Reads the text of a field. A wrong one has the reason. @param {Field} field @param {string} text @returns {{ value: unknown } | { fault: string }} */
 export function read({ name, form, example }, text) {
   const trimmed = text.trim();
-  const fault = (/** @type {string} */ what) => ({ fault: `${name}: ${trimmed === "" ? "is missing" : `"${trimmed}" is not ${what}`} (such as ${example})` });
+  const fault = (/** @type {string} */ what) => ({ fault: `${name}: ${trimmed === "" ? "missing" : `"${trimmed}" is not ${what}`} (for example ${example})` });
   if (trimmed === "") return fault("");
   if (form === "text") return { value: trimmed };
   if (form === "value" && trimmed === "off") return { value: null };
@@ -61,7 +63,8 @@ export function read({ name, form, example }, text) {
   const length = LENGTHS[form];
   if (length !== undefined) return all?.length === length ? { value: all } : fault(`${length} numbers`);
   if (all?.length !== 1) return fault("a number");
-  if (form !== "number" && !(Number.isInteger(all[0]) && all[0] >= 0)) return fault("a whole number");
+  const largest = LARGEST[form];
+  if (largest !== undefined && !(Number.isInteger(all[0]) && all[0] >= 0 && all[0] <= largest)) return fault(`a whole number up to ${largest}`);
   return { value: all[0] };
 }
 

@@ -1,5 +1,6 @@
 // Commands by hand: a choice of the command, a field for each of its values, and the answer of the node.
 
+import { sentence } from "../ui/banner.js";
 import { enable, find, make } from "../ui/dom.js";
 import { COMMANDS, messageOf } from "./command-fields.js";
 
@@ -48,10 +49,12 @@ export class CommandForm {
     const { simulation, commands } = this.app;
     const command = this.choice.value;
     const message = messageOf(command, this.inputs.map(({ value }) => value), simulation.scene?.epoch ?? 0);
+    this.answer.textContent = "";
     if ("fault" in message) return this.say(message.fault, true);
     commands.run(command, message.fields, ({ status, step, applied, text, reason }) => {
+      if (this.choice.value !== command) return;
       if (status === "applied") this.say(step === null ? "Nothing to do." : `Applied in step ${step}${applied > 1 ? ` (${applied} parts)` : ""}.`, false);
-      else this.say(text || reason, true);
+      else this.say(sentence(text || reason), true);
     });
   }
 

@@ -26,7 +26,7 @@ export function describe({ kind, step, count, commands = [] }, clock) {
 /** @param {string} kind @param {number} count @param {string[]} commands */
 function what(kind, count, commands) {
   if (kind === "tear") return `${count} ${count === 1 ? "constraint" : "constraints"} torn`;
-  if (kind === "late") return `${count} ${count === 1 ? "step" : "steps"} late`;
+  if (kind === "late") return `${count} late ${count === 1 ? "step" : "steps"}`;
   const names = commands.join(", ") || kind;
   return count > Math.max(1, commands.length) ? `${names} (${count} commands)` : names;
 }
@@ -66,6 +66,11 @@ export class MarkRow {
       const [mark] = near(event);
       if (mark !== undefined) onPick(mark.step);
     });
+  }
+
+  /** Returns whether the marks are drawn for another range. @param {number} first @param {number} last */
+  isOutside(first, last) {
+    return this.scale.first !== first || this.scale.last !== last;
   }
 
   /** Draws the marks of a track in a range, and the part that it repeats. @param {Track} track @param {Scale} scale */

@@ -8,8 +8,11 @@ import { clockText, zoomed } from "./timeline.js";
 /** Rates to choose from; a different rate set by another page is added. */
 const RATES = [0.1, 0.25, 0.5, 1, 2, 5, 10];
 
+/** Pixels that a notch of the wheel scrolls in most browsers. A touchpad sends many small turns. */
+const NOTCH = 100;
+
 /** The address of a recording, seen from the page of another or from that of the newest. @param {string} path of the page @param {string} name */
-export const addressBeside = (path, name) => `${path.replace(/replay\/[^/]+\/$/, "")}replay/${encodeURIComponent(name)}/`;
+export const addressBeside = (path, name) => `${path.replace(/(replay\/[^/]+\/)?[^/]*$/, "")}replay/${encodeURIComponent(name)}/`;
 
 /** @implements {Track} */
 export class ReplayTrack {
@@ -24,6 +27,8 @@ export class ReplayTrack {
     this.loopStart = find("loop-start", HTMLButtonElement);
     this.loopEnd = find("loop-end", HTMLButtonElement);
     this.zoom = find("zoom", HTMLSelectElement);
+    /** How far the wheel has turned since the last change of the zoom, in pixels. */
+    this.turned = 0;
     /** The part of the recording on show. */
     this.current = { first: 0, last: 0 };
     this.file = find("file", HTMLSelectElement);
@@ -75,7 +80,7 @@ export class ReplayTrack {
     return this.current;
   }
 
-  /** Time since the begin of the recording, in s. @param {number} step */
+  /** Time since the beginning of the recording, in s. @param {number} step */
   sinceBegin(step) {
     return (step - this.whole.first) / this.rateHz;
   }
@@ -85,11 +90,14 @@ export class ReplayTrack {
     return `${clockText(this.sinceBegin(step))} / ${clockText(this.sinceBegin(this.whole.last))}`;
   }
 
-  /** Zooms in or out around the state on show, as the wheel turns. @param {WheelEvent} event */
+  /** Zooms in or out by one level for each notch of the wheel. @param {WheelEvent} event */
   zoomBy(event) {
-    if (!this.isThere || event.deltaY === 0) return;
+    if (!this.isThere || this.zoom.disabled) return;
     event.preventDefault();
-    const index = this.zoom.selectedIndex + (event.deltaY < 0 ? 1 : -1);
+    this.turned += event.deltaMode === WheelEvent.DOM_DELTA_PIXEL ? event.deltaY : Math.sign(event.deltaY) * NOTCH;
+    if (Math.abs(this.turned) < NOTCH) return;
+    const index = this.zoom.selectedIndex - Math.sign(this.turned);
+    this.turned = 0;
     this.zoom.selectedIndex = Math.min(Math.max(0, index), this.zoom.options.length - 1);
     this.onChange();
   }

@@ -109,11 +109,12 @@ export class TimelineBar {
     if (!isUrgent && now - this.shownMs < SHOW_INTERVAL_MS) return;
     this.shownMs = now;
     const { first, last } = track.range();
-    const isMoved = slider.min !== String(first) || slider.max !== String(last);
-    if (isMoved) [slider.min, slider.max] = [String(first), String(last)];
+    [slider.min, slider.max] = [String(first), String(last)];
     slider.valueAsNumber = track.place;
     this.showStep(track.place);
-    if (this.marksMs !== 0 && (!isMoved || now - this.marksMs < MARKS_INTERVAL_MS)) return;
+    // The range of a live timeline moves all the time.
+    const isDue = track.name === "replay" || now - this.marksMs >= MARKS_INTERVAL_MS;
+    if (this.marksMs !== 0 && !(isDue && this.marks.isOutside(first, last))) return;
     this.marksMs = now;
     this.drawMarks();
   }

@@ -13,7 +13,7 @@ test("a tooltip says when and what, and names the commands", () => {
   assert.deepEqual(lines, [
     "0:00.000, step 100: 3 constraints torn",
     "0:01.000, step 200: pin",
-    "0:01.000, step 200: 1 step late",
+    "0:01.000, step 200: 1 late step",
     "0:02.400, step 340: cut_radius, mark: slips (9 commands)",
   ]);
 });
@@ -34,6 +34,8 @@ test("the pointer finds the marks within four pixels of a zoomed timeline", () =
 test("the pages of a folder's recordings lie beside each other", () => {
   assert.equal(addressBeside("/", "run 2"), "/replay/run%202/");
   assert.equal(addressBeside("/replay/run/", "a.b"), "/replay/a.b/");
+  assert.equal(addressBeside("/index.html", "run"), "/replay/run/");
+  assert.equal(addressBeside("/replay/run/index.html", "run 2"), "/replay/run%202/");
   assert.equal(addressBeside("/lab/replay/run%202/", "run"), "/lab/replay/run/");
 });
 
