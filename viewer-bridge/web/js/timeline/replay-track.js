@@ -27,7 +27,7 @@ export class ReplayTrack {
     this.loopStart = find("loop-start", HTMLButtonElement);
     this.loopEnd = find("loop-end", HTMLButtonElement);
     this.zoom = find("zoom", HTMLSelectElement);
-    /** How far the wheel has turned since the last change of the zoom, in pixels. */
+    /** Turn of the wheel since the last change of the zoom, in pixels. */
     this.turned = 0;
     /** The part of the recording on show. */
     this.current = { first: 0, last: 0 };
