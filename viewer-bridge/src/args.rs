@@ -6,11 +6,11 @@ use std::ffi::OsString;
 use std::net::{IpAddr, SocketAddr};
 use std::path::{Path, PathBuf};
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 use clap::{CommandFactory, Parser};
 use sim_cli::DocumentVerb;
 use sim_contract::{Endpoint, EndpointError, NAME_DEFAULT};
-use viewer_bridge::source::replay::InitialPlayback;
+use viewer_bridge::source::replay::{GhostChoice, InitialPlayback};
 use viewer_bridge::{FoxgloveOptions, FoxglovePermission, RecordingTimes, TokenDemand};
 
 /// Show a running simulation in a browser, and interact with it there.
@@ -32,6 +32,7 @@ use viewer_bridge::{FoxgloveOptions, FoxglovePermission, RecordingTimes, TokenDe
         viewer-bridge --name left --domain lab      show another node\n  \
         viewer-bridge --replay run.mcap             show a recording; needs no node\n  \
         viewer-bridge --replay recordings           show the newest recording of a folder\n  \
+        viewer-bridge --replay a.mcap --ghost b.mcap   compare two recordings of a scene\n  \
         viewer-bridge --listen 0.0.0.0:8080         serve other machines; the address has a token\n  \
         viewer-bridge --token                       keep other users of this machine out\n  \
         viewer-bridge --recordings runs             pages record into this folder\n  \
@@ -67,6 +68,10 @@ pub(crate) struct Args {
     /// can pause it and turn the repetition off [default: paused at its first step]
     #[arg(long, requires = "replay")]
     play: bool,
+    /// Recording to show as a ghost in the one of --replay, at the same steps. Both must have the same particles
+    /// and constraints. The page says at which step they differ first
+    #[arg(long, value_name = "FILE.mcap", requires = "replay")]
+    ghost: Option<PathBuf>,
     /// Also serve viewers that speak the Foxglove protocol (foxglove.sdk.v1) at this address; port 0
     /// is any free port. Loopback only: the protocol cannot authenticate clients
     #[arg(
@@ -166,6 +171,21 @@ impl Args {
     /// Playback of the recording before the first request.
     pub(crate) fn start(&self) -> InitialPlayback {
         if self.play { InitialPlayback::Looping } else { InitialPlayback::Paused }
+    }
+
+    /// The recordings that can be the ghost of the one on show.
+    ///
+    /// # Errors
+    /// The recording of the command line does not exist.
+    pub(crate) fn ghosts(&self) -> anyhow::Result<GhostChoice> {
+        if let Some(path) = self.ghost.as_deref().filter(|path| !path.is_file()) {
+            bail!(
+                "{}: no such file; give --ghost a file written by `recorder record` or `recorder simulate`",
+                path.display()
+            );
+        }
+        let folder = self.replay.clone().filter(|path| path.is_dir());
+        Ok(GhostChoice { folder, given: self.ghost.clone() })
     }
 
     /// Options of the Foxglove server, if one is requested.

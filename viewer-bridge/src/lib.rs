@@ -34,7 +34,6 @@ pub use foxglove_server::{
 };
 pub use pages::hub::Hub;
 pub use pages::recordings::Recordings;
-pub use pages::recordings::file_name::newest_recording;
 pub use pages::replays::Replays;
 pub use pages::server::{Server, ServerOptions};
 pub use shutdown::Shutdown;
@@ -42,4 +41,5 @@ pub use sink::Sinks;
 pub use socket::descriptors::open_files_warning;
 pub use socket::guard::TokenDemand;
 pub use source::Source;
+pub use source::recording_files::newest_recording;
 pub use source::recording_times::RecordingTimes;

@@ -86,7 +86,7 @@ fn run(args: &Args) -> anyhow::Result<()> {
 fn open_source(args: &Args, stop: &Stop) -> anyhow::Result<Box<dyn Source>> {
     if let Some(path) = &args.replay {
         let path = if path.is_dir() { newest_in(path)? } else { path.clone() };
-        return Ok(Box::new(Replay::open(&path, args.start(), stop, &mut note)?));
+        return Ok(Box::new(Replay::open(&path, args.start(), args.ghosts()?, stop, &mut note)?));
     }
     let mut catalog = Catalog::default();
     args.scenes.iter().try_for_each(|path| catalog.add_file(path))?;

@@ -3,6 +3,7 @@
 mod body_drive;
 mod check;
 mod from_page;
+mod ghost;
 mod recording;
 mod refusal;
 mod timeline;
@@ -11,6 +12,7 @@ mod to_page;
 pub use body_drive::BodyDrive;
 pub use check::check;
 pub use from_page::{Choice, Command, FromPage, Hello, Malformed, Wish};
+pub use ghost::{GhostState, GhostText};
 pub use recording::{RecordingState, RecordingText};
 pub use refusal::Refusal;
 pub use timeline::{Hashes, HistoryText, Mark, MarkKind, Playback, Timeline, Toward};

@@ -9,10 +9,12 @@ use std::sync::Arc;
 use recorder::{OutcomeRow, StatusRow, StepRow};
 use sim_contract::{ConstraintState, Forces, LoadHeader, ParticleState, TornConstraint, Triangle};
 
-use crate::message::{Level, Node, OutcomeText, ParametersText, Playback, Timeline, Undoable};
+use crate::message::{
+    GhostText, Level, Node, OutcomeText, ParametersText, Playback, Timeline, Undoable,
+};
 use crate::request::ClientId;
 use crate::shutdown::Shutdown;
-use crate::wire::{Colliders, Pins, Scene, Stamp, Statistics};
+use crate::wire::{Colliders, Ghost, Pins, Scene, Stamp, Statistics};
 
 /// Something that a source shows or reports.
 #[derive(Debug, Clone, Copy)]
@@ -46,6 +48,8 @@ pub enum Update<'a> {
     Timeline(&'a Timeline),
     /// The playback of the recording has changed.
     Playback(&'a Playback),
+    /// Another recording is chosen as the ghost, or more is known about it.
+    Ghost(&'a GhostText),
     /// The scene is back at its beginning.
     Reset {
         /// First step that shows it.
@@ -117,6 +121,8 @@ pub struct State<'a> {
     pub particles: &'a [ParticleState],
     /// The forces of the step, if they were read.
     pub forces: Option<&'a Forces>,
+    /// The state of another recording at the same time.
+    pub ghost: Option<&'a Ghost>,
 }
 
 /// Something that a source computes only if a client wants it.

@@ -2,6 +2,7 @@
 
 mod feed;
 pub mod live;
+pub(crate) mod recording_files;
 pub mod recording_times;
 pub mod replay;
 pub mod shown_state;

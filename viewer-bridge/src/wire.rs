@@ -8,6 +8,7 @@ mod decode;
 mod decode_error;
 mod forces;
 mod frame;
+mod ghost;
 mod header;
 mod past;
 mod scene;
@@ -22,6 +23,7 @@ pub use forces::Forces;
 pub use frame::{
     Bounds, Format, Frame, FrameHead, FrameLimits, encode as encode_frame, frame_flag,
 };
+pub use ghost::Ghost;
 pub use header::{KIND_VERSION, Kind, Stamp};
 pub use past::Past;
 pub use scene::{Scene, SceneText, ShapeText, scene_flag};

@@ -56,6 +56,16 @@ pub fn first_difference(
     })
 }
 
+/// Returns the distance between the positions of a particle in two states, in m. It is computed in f64, so that the
+/// difference of near positions is exact.
+pub fn distance(a: &ParticleState, b: &ParticleState) -> f64 {
+    let squares = a.position.iter().zip(b.position).map(|(a, b)| {
+        let difference = f64::from(*a) - f64::from(b);
+        difference * difference
+    });
+    squares.sum::<f64>().sqrt()
+}
+
 fn value(field: &str, bits: u32) -> String {
     if field == "flags" {
         format!("{bits:#x}")

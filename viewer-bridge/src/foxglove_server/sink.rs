@@ -68,6 +68,7 @@ impl Sink for FoxgloveSink {
             // The protocol has no messages for these, or they are for pages.
             Update::LoadRefused { .. }
             | Update::Pins(_)
+            | Update::Ghost(_)
             | Update::SameState
             | Update::Statistics(_)
             | Update::Node(_)

@@ -96,6 +96,7 @@ impl Bench {
             publish_monotonic_ns: 0,
             particles: &[ParticleState::default(); 2],
             forces: None,
+            ghost: None,
         };
         self.publisher.publish_state_at(now_ns, &state);
     }

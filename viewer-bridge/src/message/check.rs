@@ -78,6 +78,7 @@ pub fn check(command: &Command) -> Result<(), Reason> {
         | Command::Record {}
         | Command::StopRecording {}
         | Command::Seek { .. }
+        | Command::Ghost { .. }
         | Command::Loop { .. } => Ok(()),
     }
 }

@@ -188,6 +188,11 @@ pub enum Command {
     Rate {
         value: f32,
     },
+    Ghost {
+        /// Name of a recording; `None` for no ghost.
+        #[serde(default)]
+        name: Option<String>,
+    },
     Loop {
         is_on: bool,
         /// First step of the loop; without it, that of the recording.
@@ -238,6 +243,7 @@ impl Command {
             Self::StopRecording {} => "stop_recording",
             Self::Seek { .. } => "seek",
             Self::Rate { .. } => "rate",
+            Self::Ghost { .. } => "ghost",
             Self::Loop { .. } => "loop",
         }
     }

@@ -48,6 +48,8 @@ pub enum Refusal {
     AlreadyRecording,
     /// No recording is being made.
     NotRecording,
+    /// The folder has no recording of this name.
+    UnknownRecording,
 }
 
 impl From<Reason> for Refusal {
@@ -91,6 +93,7 @@ impl Refusal {
             Self::RecordingNotAllowed => "recording_not_allowed",
             Self::AlreadyRecording => "already_recording",
             Self::NotRecording => "not_recording",
+            Self::UnknownRecording => "unknown_recording",
         }
     }
 
@@ -142,6 +145,9 @@ impl Refusal {
             }
             Self::AlreadyRecording => "a recording is being made already; stop it first",
             Self::NotRecording => "no recording is being made",
+            Self::UnknownRecording => {
+                "there is no such recording; load the page again to see those of the folder"
+            }
         };
         text.into()
     }

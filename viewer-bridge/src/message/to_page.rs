@@ -4,6 +4,7 @@ use serde::{Serialize, Serializer};
 use sim_contract::ParameterValues;
 
 use super::from_page::Choice;
+use super::ghost::GhostText;
 use super::recording::RecordingText;
 use super::refusal::Refusal;
 use super::timeline::{HistoryText, Playback, Timeline};
@@ -43,6 +44,8 @@ pub enum ToPage {
     Timeline(Box<Timeline>),
     /// The playback of a recording.
     Playback(Playback),
+    /// The ghost of a recording.
+    Ghost(GhostText),
     /// The past of a live simulation.
     History(HistoryText),
     /// The recording that the bridge makes.

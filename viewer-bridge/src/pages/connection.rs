@@ -109,13 +109,14 @@ impl Connection {
         }
         sent.newest = Some(frame.number);
         let Some(encoded) = encoded else { return NextFrame::Missed };
-        let mut messages = Vec::with_capacity(5);
+        let mut messages = Vec::with_capacity(6);
         if let Some(colliders) = &frame.colliders
             && sent.colliders != Some(colliders.number)
         {
             sent.colliders = Some(colliders.number);
             messages.push(colliders.bytes.clone());
         }
+        messages.extend(frame.ghost.clone());
         messages.extend(wished);
         messages.push(encoded.clone());
         sent.unacknowledged.push_back(frame.number);

@@ -7,7 +7,7 @@ use super::frame_set::{ColliderSet, Formats, FrameProperties, FrameSet};
 use crate::sink::State;
 use crate::wire::convert::{microseconds, to_f32};
 use crate::wire::{
-    Colliders, Forces, Format, FrameHead, FrameLimits, Inspected, Scene, Speeds, Stamp,
+    Colliders, Forces, Format, FrameHead, FrameLimits, Ghost, Inspected, Scene, Speeds, Stamp,
     encode_frame,
 };
 
@@ -83,6 +83,7 @@ impl FrameEncoder {
             u16: formats.u16.then(|| encode(Format::U16)),
             colliders: self.colliders.clone(),
             forces: state.forces.map(|forces| encode_forces(head.stamp, forces)),
+            ghost: state.ghost.map(|ghost| encode_ghost(state.epoch, ghost)),
             speeds: wanted
                 .speeds
                 .then(|| Speeds::from_particles(head.stamp, state.particles).encode()),
@@ -111,4 +112,10 @@ impl FrameEncoder {
 
 fn encode_forces(stamp: Stamp, forces: &sim_contract::Forces) -> Bytes {
     Forces { stamp, rate_hz: forces.header.rate_hz, rows: forces.rows.clone() }.encode()
+}
+
+fn encode_ghost(epoch: u32, ghost: &Ghost) -> Bytes {
+    let mut ghost = ghost.clone();
+    ghost.stamp.epoch = epoch;
+    ghost.encode()
 }

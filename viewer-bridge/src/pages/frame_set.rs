@@ -22,6 +22,8 @@ pub(crate) struct FrameSet {
     pub(crate) colliders: Option<ColliderSet>,
     /// FORCES of the same step, if they were read.
     pub(crate) forces: Option<Bytes>,
+    /// GHOST beside it, if a ghost is chosen and has a state there.
+    pub(crate) ghost: Option<Bytes>,
     /// SPEEDS of the same step, if a page wants them.
     pub(crate) speeds: Option<Bytes>,
     /// INSPECTED of the same step, with the particles that any page wants.
@@ -32,8 +34,8 @@ impl FrameSet {
     /// Size of all messages.
     pub(super) fn size_bytes(&self) -> usize {
         let colliders = self.colliders.as_ref().map(|colliders| &colliders.bytes);
-        let Self { f32, u16, forces, speeds, inspected, .. } = self;
-        let messages = [f32, u16, forces, speeds, inspected].map(Option::as_ref);
+        let Self { f32, u16, forces, ghost, speeds, inspected, .. } = self;
+        let messages = [f32, u16, forces, ghost, speeds, inspected].map(Option::as_ref);
         messages.into_iter().chain([colliders]).flatten().map(Bytes::len).sum()
     }
 }

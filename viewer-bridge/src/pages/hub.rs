@@ -19,7 +19,6 @@ use super::frame_encoder::{FrameEncoder, Wanted};
 pub use super::frame_set::Formats;
 use super::frame_set::{FrameProperties, FrameSet};
 use super::history::{History, PastMessages, Viewer};
-use super::recordings::file_name::names_in;
 use crate::limits::{PROTOCOL, RELIABLE_QUEUED_MAX};
 use crate::message::{
     Choice, Level, Mode, Node, PageLimits, RecordingText, Refusal, ToPage, Toward, Welcome,
@@ -27,6 +26,7 @@ use crate::message::{
 use crate::request::{ClientId, RequestKind, RequestSender};
 use crate::scene::catalog::SceneEntry;
 use crate::sink::{Demand, Sink, State, Torn, Update};
+use crate::source::recording_files::names_in;
 use crate::wire::convert::count_u32;
 use crate::wire::{Stamp, Statistics, Tear};
 
@@ -37,6 +37,7 @@ enum Slot {
     Parameters,
     Timeline,
     Playback,
+    Ghost,
     Recording,
     /// A new scene empties the slots after this one.
     Scene,
@@ -367,6 +368,7 @@ impl Sink for Hub {
             Update::Timeline(timeline) => {
                 self.latch(Slot::Timeline, &ToPage::Timeline(Box::new(timeline.clone())));
             }
+            Update::Ghost(ghost) => self.latch(Slot::Ghost, &ToPage::Ghost(ghost.clone())),
             Update::Playback(playback) => self.latch(Slot::Playback, &ToPage::Playback(*playback)),
             Update::Reset { step } => self.broadcast(&ToPage::Reset { step }),
             Update::Notice { level, text } => {

@@ -3,7 +3,6 @@
 //! The recorder ends its file cleanly on a signal, and also when nobody reads its progress any longer. So
 //! it neither stays behind nor loses its file if this process is killed.
 
-pub mod file_name;
 mod recorder_process;
 
 use std::fs;
@@ -18,6 +17,7 @@ use sim_contract::console::note;
 
 use super::hub::{Hub, lock};
 use crate::message::{NodeState, RecordingState, RecordingText, Refusal};
+use crate::source::recording_files;
 use recorder_process::{Line, Progress, RecorderId, RecorderProcess, Report, StopReason};
 
 /// Remedy for a folder that cannot hold a recording.
@@ -165,7 +165,7 @@ impl Recordings {
         fs::create_dir_all(folder).with_context(|| {
             format!("cannot create the folder {}; {CHOOSE_A_FOLDER}", folder.display())
         })?;
-        let path = file_name::free_path(folder, scene, realtime_ns());
+        let path = recording_files::free_path(folder, scene, realtime_ns());
         let mut recorder = RecorderProcess::start(&self.endpoint, &path)?;
         let mut report = None;
         while let Some(line) = recorder.next_line() {
@@ -202,7 +202,7 @@ impl Recordings {
     fn show_report(&self, path: &Path, report: Report) -> String {
         let mut present = lock(&self.present);
         let shown = &mut present.shown;
-        shown.name = file_name::name_of(path);
+        shown.name = recording_files::name_of(path);
         shown.path = Some(path.display().to_string());
         (shown.snapshots, shown.lost) = (report.snapshots, report.lost);
         if let Ok(metadata) = fs::metadata(path) {

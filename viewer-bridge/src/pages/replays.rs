@@ -10,14 +10,14 @@ use tokio::sync::Mutex;
 use tokio::task::spawn_blocking;
 
 use super::hub::Hub;
-use super::recordings::file_name::path_of;
 use crate::limits::REPLAYS_MAX;
 use crate::message::Mode;
 use crate::request::requests;
 use crate::shutdown::Shutdown;
 use crate::sink::Sinks;
 use crate::source::Source;
-use crate::source::replay::{InitialPlayback, Replay};
+use crate::source::recording_files::path_of;
+use crate::source::replay::{GhostChoice, InitialPlayback, Replay};
 use crate::source::thread::start_source;
 
 /// The open recordings of a folder.
@@ -67,7 +67,9 @@ impl Replays {
         }
         let stop = self.stop.clone();
         let start = InitialPlayback::Paused;
-        let opened = spawn_blocking(move || Replay::open(&path, start, &stop, &mut note)).await;
+        let ghosts = GhostChoice { folder: self.folder.clone(), given: None };
+        let open_file = move || Replay::open(&path, start, ghosts, &stop, &mut note);
+        let opened = spawn_blocking(open_file).await;
         let replay = opened.map_err(|_| "the recording cannot be read".to_owned())?;
         let replay = replay.map_err(|error| {
             // The first cause is the path, which pages need not know.

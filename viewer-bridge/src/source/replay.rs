@@ -4,6 +4,7 @@
 //! start, to check the hashes and to find the marks of the timeline.
 
 mod check;
+mod ghosts;
 mod marks;
 mod open;
 mod player;
@@ -27,13 +28,17 @@ use crate::request::Requests;
 use crate::sink::Sinks;
 use crate::source::recording_times::RecordingTimes;
 use check::{Job, check};
+use ghosts::Ghosts;
 use open::Recording;
 use player::Player;
+
+pub use ghosts::GhostChoice;
 
 /// A recording as a source.
 #[derive(Debug)]
 pub struct Replay {
     recording: Recording,
+    ghosts: Ghosts,
     start: InitialPlayback,
 }
 
@@ -47,18 +52,21 @@ pub enum InitialPlayback {
 }
 
 impl Replay {
-    /// Opens a recording, until a signal arrives. `note` receives messages for the user.
+    /// Opens a recording, until a signal arrives. Its ghost is one of `ghosts`. `note` receives messages for the user.
     ///
     /// # Errors
     /// The file is not a recording, or has no state to show. The message names the remedy.
     pub fn open(
         path: &Path,
         start: InitialPlayback,
+        ghosts: GhostChoice,
         stop: &Stop,
         note: &mut dyn FnMut(&str),
     ) -> anyhow::Result<Self> {
         let recording = open::open(path, stop, note).with_context(|| path.display().to_string())?;
-        Ok(Self { recording, start })
+        let mut ghosts = Ghosts::new(ghosts, stop.clone());
+        ghosts.choose_given(&recording);
+        Ok(Self { recording, ghosts, start })
     }
 
     fn job(&self) -> anyhow::Result<Job> {
@@ -97,7 +105,7 @@ impl Source for Replay {
                 .name("check".to_owned())
                 .spawn_scoped(scope, || check(job, &sender, &is_cancelled))
                 .context("starting the thread that checks the recording")?;
-            let mut player = Player::new(&mut self.recording, reports, sinks);
+            let mut player = Player::new(&mut self.recording, &mut self.ghosts, reports, sinks);
             if self.start == InitialPlayback::Looping {
                 player.start_looping();
             }

@@ -4,6 +4,7 @@ use super::cursor::Cursor;
 use super::decode_error::DecodeError;
 use super::forces::Forces;
 use super::frame::{self, Format, Frame};
+use super::ghost::Ghost;
 use super::header::{KIND_VERSION, Kind, Stamp};
 use super::past::Past;
 use super::scene::Scene;
@@ -34,6 +35,8 @@ pub enum Message {
     Inspected(Inspected),
     /// The head of an earlier state.
     Past(Past),
+    /// A state of another recording.
+    Ghost(Ghost),
 }
 
 /// Decodes one message.
@@ -71,6 +74,8 @@ pub fn decode(bytes: &[u8]) -> Result<Message, DecodeError> {
         Message::Inspected(Inspected::decode(stamp, &mut cursor)?)
     } else if is(Kind::Past) {
         Message::Past(Past::decode(stamp, &mut cursor)?)
+    } else if is(Kind::Ghost) {
+        Message::Ghost(Ghost::decode(stamp, &mut cursor)?)
     } else {
         return Err(unknown);
     };

@@ -29,6 +29,8 @@ pub enum Kind {
     Inspected = 10,
     /// The head of an earlier state.
     Past = 11,
+    /// A state of another recording.
+    Ghost = 12,
 }
 
 /// Load and step that a message belongs to.

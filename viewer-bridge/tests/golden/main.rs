@@ -17,7 +17,7 @@ use sim_contract::{
 };
 use sim_solver::scene::ColliderMesh;
 use viewer_bridge::wire::{
-    Bounds, Colliders, Forces, Format, FrameHead, FrameLimits, Inspected, Message, Past,
+    Bounds, Colliders, Forces, Format, FrameHead, FrameLimits, Ghost, Inspected, Message, Past,
     Percentiles, Pins, Scene, SceneText, ShapeText, Speeds, Stamp, Statistics, Tear, decode,
     encode_frame, frame_flag, scene_flag,
 };
@@ -156,6 +156,13 @@ fn inspected() -> Inspected {
     Inspected::from_particles(STAMP, &particles()[..2], &[1, 2])
 }
 
+/// A state of another recording, one step earlier.
+fn ghost() -> Ghost {
+    let positions = vec![[0.5, 0.25, 0.125], [0.0; 3], [1.0, 2.0, 3.0]];
+    let stamp = Stamp { step: STAMP.step - 1, ..STAMP };
+    Ghost { stamp, farthest: 2, distance: 0.75, positions, hidden: vec![4, 1] }
+}
+
 /// All binary messages, by name.
 fn messages() -> Vec<(&'static str, Vec<u8>)> {
     let finite = &particles()[..3];
@@ -187,6 +194,7 @@ fn messages() -> Vec<(&'static str, Vec<u8>)> {
         ("forces", forces().encode().to_vec()),
         ("speeds", Speeds::from_particles(STAMP, &particles()).encode().to_vec()),
         ("inspected", inspected().encode().to_vec()),
+        ("ghost", ghost().encode().to_vec()),
         ("past", Past { stamp: STAMP, count: 4 }.encode().to_vec()),
     ]
 }
@@ -253,6 +261,11 @@ fn fields(message: &Message) -> Value {
         }),
         Message::Past(past) => json!({
             "kind": 11, "epoch": past.stamp.epoch, "step": past.stamp.step, "count": past.count,
+        }),
+        Message::Ghost(ghost) => json!({
+            "kind": 12, "epoch": ghost.stamp.epoch, "step": ghost.stamp.step,
+            "farthest": ghost.farthest, "distance": ghost.distance,
+            "positions": ghost.positions, "hidden": ghost.hidden,
         }),
         wish => wished_fields(wish),
     }

@@ -3,9 +3,9 @@
 use serde_json::{Value, json};
 use sim_contract::{ParameterValues, Reason};
 use viewer_bridge::message::{
-    Choice, FromPage, Hashes, HistoryText, Level, Mark, MarkKind, Mode, Node, NodeState,
-    OutcomeText, PageLimits, ParametersText, Playback, RecordingState, RecordingText, Refusal,
-    Status, Timeline, ToPage, Undoable, Welcome,
+    Choice, FromPage, GhostState, GhostText, Hashes, HistoryText, Level, Mark, MarkKind, Mode,
+    Node, NodeState, OutcomeText, PageLimits, ParametersText, Playback, RecordingState,
+    RecordingText, Refusal, Status, Timeline, ToPage, Undoable, Welcome,
 };
 use viewer_bridge::scene::catalog::Catalog;
 
@@ -127,11 +127,18 @@ fn to_page_of_a_replay() -> Vec<ToPage> {
             step: 240,
             time_s: 1.0,
         }),
+        ToPage::Ghost(GhostText {
+            state: GhostState::Different,
+            name: Some("changed".to_owned()),
+            given: Some("changed".to_owned()),
+            text: "changed differs from step 60 (0.250 s): particle 3, velocity y".to_owned(),
+            first_different_step: Some(60),
+        }),
     ]
 }
 
 /// One message of each kind that a page may send.
-const FROM_PAGE: [&str; 37] = [
+const FROM_PAGE: [&str; 39] = [
     r#"{"type":"hello","protocol":2,"token":"00","format":"u16"}"#,
     r#"{"type":"hello","protocol":2}"#,
     r#"{"type":"ack","frame":77}"#,
@@ -165,6 +172,8 @@ const FROM_PAGE: [&str; 37] = [
     r#"{"type":"record","id":4}"#,
     r#"{"type":"stop_recording"}"#,
     r#"{"type":"seek","step":1200}"#,
+    r#"{"type":"ghost","name":"changed"}"#,
+    r#"{"type":"ghost"}"#,
     r#"{"type":"rate","value":0.5}"#,
     r#"{"type":"loop","is_on":true}"#,
     r#"{"type":"loop","is_on":true,"first_step":240,"last_step":480}"#,

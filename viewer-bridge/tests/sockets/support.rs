@@ -188,6 +188,7 @@ pub(crate) fn state(step: u64, particles: &[ParticleState]) -> State<'_> {
         publish_monotonic_ns: 0,
         particles,
         forces: None,
+        ghost: None,
     }
 }
 

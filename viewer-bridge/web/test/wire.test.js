@@ -8,7 +8,7 @@ import { decode } from "../js/net/wire.js";
 
 const golden = JSON.parse(readFileSync(new URL("../../tests/golden/messages.json", import.meta.url), "utf8"));
 const SHAPES = ["plane", "box", "sphere", "capsule", "bounds", "mesh"];
-const KINDS = ["", "scene", "frame", "frame", "tear", "pins", "stats", "colliders", "forces", "speeds", "inspected", "past"];
+const KINDS = ["", "scene", "frame", "frame", "tear", "pins", "stats", "colliders", "forces", "speeds", "inspected", "past", "ghost"];
 const RECIPIENTS = ["collider", "anchor", "particle"];
 
 /** Decodes hex into an array buffer that starts at offset 0. */
@@ -45,6 +45,7 @@ const readers = {
   colliders: (m) => ({ colliders: m.colliders }),
   speeds: (m) => ({ speeds: [...m.speeds] }),
   inspected: (m) => ({ particles: m.rows.map((row) => ({ particle: row.particle, position: row.position, velocity: row.velocity, inverse_mass: row.inverseMass })) }),
+  ghost: (m) => ({ farthest: m.farthest, distance: m.distance, positions: triples(m.positions), hidden: [...m.hidden] }),
   past: (m) => ({ count: m.count }),
   forces: (m) => ({
     rate_hz: m.rateHz,

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use recorder::verification::distance;
 use serde::Serialize;
 use sim_contract::ParticleState;
 
@@ -25,16 +26,8 @@ impl fmt::Display for Distance {
 }
 
 impl Distance {
-    /// Computes in f64, so that the difference of near positions is exact.
     pub(super) fn new(step: u64, rate_hz: u32, a: &[ParticleState], b: &[ParticleState]) -> Self {
-        let distance = |(a, b): (&ParticleState, &ParticleState)| {
-            let squares = a.position.iter().zip(b.position).map(|(a, b)| {
-                let difference = f64::from(*a) - f64::from(b);
-                difference * difference
-            });
-            squares.sum::<f64>().sqrt()
-        };
-        let distances = || a.iter().zip(b).map(distance);
+        let distances = || a.iter().zip(b).map(|(a, b)| distance(a, b));
         let greatest_m = distances().fold(0.0, |greatest: f64, one| {
             // A distance that is not finite is the greatest.
             if one.is_nan() || greatest.is_nan() { f64::NAN } else { greatest.max(one) }

@@ -69,7 +69,9 @@ pub(super) fn actions(
             value: ParameterValue::Number(value),
             constraint_kind: None,
         },
-        Command::Seek { .. } | Command::Loop { .. } => return Err(Refusal::OnlyReplay),
+        Command::Seek { .. } | Command::Loop { .. } | Command::Ghost { .. } => {
+            return Err(Refusal::OnlyReplay);
+        }
         // The server of the pages and the link answer them.
         Command::Look { .. }
         | Command::Undo { .. }
@@ -88,6 +90,7 @@ fn changes_simulation(command: &Command) -> bool {
         | Command::Rate { .. }
         | Command::Rewind { .. }
         | Command::Seek { .. }
+        | Command::Ghost { .. }
         | Command::Loop { .. } => false,
         Command::Set { parameter, .. } => *parameter != Parameter::TimeScale.name(),
         _ => true,

@@ -298,6 +298,7 @@ impl Link {
         }
         let flag = |own: u32, flag: u32| if header.flags & own == 0 { 0 } else { flag };
         let state = State {
+            ghost: None,
             epoch: shown.epoch(),
             row: StepRow::from(header),
             sim_time_s: header.step as f64 / f64::from(load.header.rate_hz.max(1)),

@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::io::ErrorKind;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow, bail};
 use recorder::{LogEnd, ReadError, Tape, TapeError, TapeState};
@@ -23,6 +23,7 @@ pub(super) struct Recording {
     pub(super) load: Load,
     /// The state at the first step.
     pub(super) first: TapeState,
+    pub(super) path: PathBuf,
     /// Name of the file without its folder, which clients need not know.
     pub(super) file: String,
 }
@@ -67,7 +68,8 @@ pub(super) fn open(
     let load = load_of(&tape)?;
     let first = tape.state_at(tape.first_step()).map_err(|error| with_remedy(path, error))?;
     let name = path.file_name().unwrap_or(path.as_os_str());
-    Ok(Recording { tape, load, first, file: name.to_string_lossy().into_owned() })
+    let file = name.to_string_lossy().into_owned();
+    Ok(Recording { tape, load, first, path: path.to_owned(), file })
 }
 
 /// Says where a file ends that lacks its end, and how to keep the rest of it. Empty if it is complete.

@@ -8,6 +8,7 @@ use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{Forces, ForcesHeader, ParameterValues, Reason};
 
 use super::check::Report;
+use super::ghosts::Ghosts;
 use super::open::Recording;
 use super::playhead::{Advanced, Playhead};
 use super::resets::ResetFinder;
@@ -33,6 +34,7 @@ const REQUESTS_AT_ONCE_MAX: usize = 1024;
 #[derive(Debug)]
 pub(super) struct Player<'a> {
     recording: &'a mut Recording,
+    ghosts: &'a mut Ghosts,
     sinks: &'a Sinks,
     reports: Receiver<Report>,
     report: Report,
@@ -66,6 +68,7 @@ impl<'a> Player<'a> {
     /// Starts at the first step.
     pub(super) fn new(
         recording: &'a mut Recording,
+        ghosts: &'a mut Ghosts,
         reports: Receiver<Report>,
         sinks: &'a Sinks,
     ) -> Self {
@@ -78,6 +81,7 @@ impl<'a> Player<'a> {
         };
         Self {
             recording,
+            ghosts,
             sinks,
             reports,
             report,
@@ -106,12 +110,14 @@ impl<'a> Player<'a> {
         let scene = self.recording.load.to_scene(self.state.row.step, &self.state.particles);
         self.publish_timeline();
         self.publish_playback();
+        self.publish_ghost();
         self.shown.begin_load(self.sinks, scene);
         self.sinks.publish(&Update::Topology(self.recording.load.topology()));
         self.publish_changes();
         while !self.sinks.is_shutting_down() {
             self.handle_requests(requests)?;
             self.update_report();
+            self.update_ghost();
             let now_ns = monotonic_ns();
             if self.playhead.advance(now_ns) == Advanced::ToEnd {
                 self.is_playback_changed = true;
@@ -181,6 +187,13 @@ impl<'a> Player<'a> {
                     return Ok(Err(Reason::OutOfRange.into()));
                 }
             }
+            Command::Ghost { name } => {
+                if let Err(refusal) = self.ghosts.choose(name.as_deref(), self.recording) {
+                    return Ok(Err(refusal));
+                }
+                self.on_show = None;
+                self.publish_ghost();
+            }
             Command::Seek { step } => {
                 let step = self.recording.tape.step_at(*step)?;
                 playhead.go_to(step, now_ns);
@@ -222,6 +235,9 @@ impl<'a> Player<'a> {
             }
         }
         self.read_forces()?;
+        if self.ghosts.read(&self.state, &self.recording.load.constraints)? {
+            self.on_show = None;
+        }
         for fault in self.recording.tape.drain_faults() {
             let text = &format!("{}: {fault}; it is skipped", self.recording.file);
             self.sinks.publish(&Update::Notice { level: Level::Warning, text });
@@ -312,6 +328,7 @@ impl<'a> Player<'a> {
             publish_monotonic_ns: now_ns,
             particles: &self.state.particles,
             forces: self.forces.as_ref().and_then(|(_, forces)| forces.as_ref()),
+            ghost: self.ghosts.state(),
         };
         self.shown.show(self.sinks, state);
     }
@@ -336,6 +353,17 @@ impl<'a> Player<'a> {
     fn publish_timeline(&self) {
         let timeline = texts::timeline(self.recording, &self.report);
         self.sinks.publish(&Update::Timeline(&timeline));
+    }
+
+    /// Takes what the thread of the ghost has found.
+    fn update_ghost(&mut self) {
+        if self.ghosts.update() {
+            self.publish_ghost();
+        }
+    }
+
+    fn publish_ghost(&self) {
+        self.sinks.publish(&Update::Ghost(self.ghosts.text()));
     }
 
     fn publish_playback(&mut self) {

@@ -5,10 +5,11 @@ import { bodyRadii, bridgeTriangles, planksOf } from "../state/shapes.js";
 import { drawnSticks } from "../state/topology.js";
 import { layFlat } from "../state/weave.js";
 import { ArrayTexture, UNITS, layouts } from "./context.js";
-import { Cloth } from "./cloth.js";
-import { Planks } from "./planks.js";
-import { POINT, Points } from "./points.js";
-import { Sticks } from "./sticks.js";
+import { Cloth } from "./particles/cloth.js";
+import { Planks } from "./particles/planks.js";
+import { GhostSticks } from "./particles/ghost-sticks.js";
+import { POINT, Points } from "./particles/points.js";
+import { Sticks } from "./particles/sticks.js";
 import { PIN } from "../net/wire.js";
 
 /** @typedef {import("../net/wire.js").Frame} Frame */
@@ -80,6 +81,8 @@ export class SceneBuffers {
     this.flatPlaces = hasEffects ? new ArrayTexture(gl, UNITS.u_flat_places, formats.f32x2, scene.particleCount) : null;
     if (scene.particleCount > 0) this.flatPlaces?.write(layFlat(topology));
     drawables.sticks.setSticks(topology, drawnSticks(scene, STICKS_MAX), hasEffects ? this.radii() : new Float32Array(scene.constraintCount));
+    /** Created for the first state of a ghost. @type {GhostSticks | null} */
+    this.ghost = null;
     this.writeTopology(true);
     this.writeParticles();
     this.writeMarks();
@@ -95,6 +98,13 @@ export class SceneBuffers {
   /** @param {Frame} frame */
   writePositions(frame) {
     if (frame.particleCount > 0) this.positions.write(frame.positions);
+  }
+
+  /** @param {import("../net/wire.js").Ghost} ghost */
+  writeGhost(ghost) {
+    if (ghost.positions.length !== 3 * this.scene.particleCount) return;
+    this.ghost ??= new GhostSticks(this.gl, this.topology, STICKS_MAX);
+    this.ghost.write(ghost);
   }
 
   /** @param {Float32Array} speeds */
@@ -143,6 +153,7 @@ export class SceneBuffers {
 
   delete() {
     for (const texture of [this.positions, this.fanRanges, this.fans, this.splits, this.speeds, this.flatPlaces]) texture?.delete();
+    this.ghost?.delete();
     this.drawables.clear();
   }
 }

@@ -44,6 +44,10 @@ export class Program {
     }
   }
 
+  delete() {
+    this.gl.deleteProgram(this.handle);
+  }
+
   use() {
     this.gl.useProgram(this.handle);
   }

@@ -67,6 +67,8 @@ export class Renderer {
     this.stepDrawn = -1;
     /** @type {import("../net/wire.js").Frame | null} */
     this.frameDrawn = null;
+    /** @type {import("../net/wire.js").Ghost | null} */
+    this.ghostWritten = null;
     this.isDirty = true;
     /** Parts that have changed since they were uploaded. */
     this.stale = { topology: false, particles: false, marks: false, colliders: true, poles: true };
@@ -168,6 +170,7 @@ export class Renderer {
     this.drawSurroundings(uniforms);
     if (this.simulation.scene?.isPlanar) this.drawFlat(uniforms);
     else this.drawSolid(uniforms);
+    this.drawGhost(uniforms);
     this.drawForces(uniforms);
     this.framesDrawn++;
     this.isDirty = false;
@@ -199,7 +202,7 @@ export class Renderer {
     if (this.buffers === null || this.buffers.scene !== scene || this.buffers.drawables !== drawables) {
       this.buffers?.delete();
       this.buffers = new SceneBuffers(this.gl, simulation, drawables);
-      this.frameDrawn = null;
+      this.frameDrawn = this.ghostWritten = null;
       stale.topology = stale.particles = stale.marks = false;
       stale.colliders = stale.poles = true;
     }
@@ -208,6 +211,8 @@ export class Renderer {
     if (stale.marks) this.buffers.writeMarks();
     if (frame !== this.frameDrawn) this.buffers.writePositions(frame);
     if (simulation.speeds !== null && this.paint() === PAINT.speeds) this.buffers.writeSpeeds(simulation.speeds.speeds);
+    if (simulation.ghost !== null && simulation.ghost !== this.ghostWritten) this.buffers.writeGhost(simulation.ghost);
+    this.ghostWritten = simulation.ghost;
     if (stale.colliders) this.placeColliders(scene.isPlanar);
     if (stale.poles) this.placePoles();
     this.frameDrawn = frame;
@@ -415,6 +420,15 @@ export class Renderer {
   drawSticks(uniforms) {
     const isAll = this.toggles.sticks || this.paint() === PAINT.kinds || !this.hasSurface() || !this.toggles.surface;
     this.drawables?.sticks.draw({ ...uniforms, u_is_all: isAll ? 1 : 0 });
+  }
+
+  /** @param {Uniforms} uniforms */
+  drawGhost(uniforms) {
+    const { buffers, simulation } = this;
+    if (simulation.ghost === null || !buffers?.ghost) return;
+    const isFlat = simulation.scene?.isPlanar ?? false;
+    const color = paletteOf(this.isDark).ghost;
+    buffers.ghost.draw({ ...uniforms, u_stick: color, u_stick_faint: color, u_forward: isFlat ? 0 : 4e-4 }, buffers.positions, isFlat);
   }
 
   /** @param {Uniforms} uniforms */

@@ -15,12 +15,16 @@
  * @typedef {Record<string, ParameterValue | Record<string, ParameterValue>>} Values
  * @typedef {{ type: "parameters", is_complete: boolean, values: Values | null, initial: Values | null }} Parameters
  * @typedef {{ type: "outcome", id: number | null, kind: string, status: "applied" | "rejected" | "unanswered", step: number | null, applied: number, rejected: number, reason: string, text: string, state_step?: number }} OutcomeMessage
- * @typedef {{ kind: "tear" | "pin" | "command" | "late", step: number, count: number, commands?: string[] }} Mark
+ * @typedef {{ kind: "tear" | "pin" | "command" | "late" | "ghost", step: number, count: number, commands?: string[] }} Mark
  * @typedef {{
  *   type: "timeline", file: string, scene: string, rate_hz: number, first_step: number, last_step: number,
  *   first_time_s: number, last_time_s: number, marks: Mark[], hashes: string, hash_text: string, incomplete: string,
  * }} TimelineMessage
  * @typedef {{ type: "playback", is_playing: boolean, rate: number, is_looping: boolean, loop_steps: number[] | null, step: number, time_s: number }} Playback
+ * @typedef {{
+ *   type: "ghost", state: "none" | "opening" | "comparing" | "equal" | "different" | "failed", name: string | null, given: string | null,
+ *   text: string, first_different_step: number | null,
+ * }} GhostMessage
  * @typedef {{ type: "history", first_step: number | null, marks: Mark[], text: string }} HistoryMessage
  * @typedef {{
  *   type: "recording", state: "unavailable" | "idle" | "recording" | "finishing" | "finished" | "failed", text: string, name: string | null,
@@ -28,7 +32,7 @@
  * }} RecordingMessage
  * @typedef {"cut" | "reset" | "load" | "rewind"} Undoable
  * @typedef {{ type: "undoable", what: Undoable | null }} UndoableMessage
- * @typedef {Hello | NodeState | Parameters | OutcomeMessage | TimelineMessage | Playback | HistoryMessage | UndoableMessage | RecordingMessage | { type: "clients", count: number }
+ * @typedef {Hello | NodeState | Parameters | OutcomeMessage | TimelineMessage | Playback | GhostMessage | HistoryMessage | UndoableMessage | RecordingMessage | { type: "clients", count: number }
  *   | { type: "reset", step: number } | { type: "notice", level: string, text: string }} TextMessage
  */
 

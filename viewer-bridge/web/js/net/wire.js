@@ -53,7 +53,8 @@
  * @typedef {{ particle: number, position: Vec3, velocity: Vec3, inverseMass: number }} InspectedRow
  * @typedef {Header & { kind: "inspected", rows: InspectedRow[] }} Inspected
  * @typedef {Header & { kind: "past", count: number }} Past
- * @typedef {Scene | Frame | Tear | Pins | Stats | Colliders | Forces | Speeds | Inspected | Past} Message
+ * @typedef {Header & { kind: "ghost", positions: Float32Array, hidden: Uint32Array, farthest: number, distance: number }} Ghost  a state of another recording
+ * @typedef {Scene | Frame | Tear | Pins | Stats | Colliders | Forces | Speeds | Inspected | Past | Ghost} Message
  */
 
 /** Flags of a particle in PINS. */
@@ -131,6 +132,7 @@ const DECODERS = /** @type {Record<number, (reader: Reader, header: Header) => M
   9: decodeSpeeds,
   10: decodeInspected,
   11: decodePast,
+  12: decodeGhost,
 });
 
 /**
@@ -322,4 +324,12 @@ function decodePast(reader, header) {
   const count = reader.u32();
   reader.u32();
   return { kind: "past", ...header, count };
+}
+
+/** @param {Reader} reader @param {Header} header @returns {Ghost} */
+function decodeGhost(reader, header) {
+  const count = reader.u32();
+  const hiddenCount = reader.u32();
+  const [farthest, distance] = [reader.u32(), reader.f32()];
+  return { kind: "ghost", ...header, positions: reader.array(Float32Array, 3 * count), hidden: reader.array(Uint32Array, hiddenCount), farthest, distance };
 }

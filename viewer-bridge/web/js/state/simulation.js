@@ -36,6 +36,7 @@ const FLOOR_COSINE = 0.99;
  * @typedef {{
  *   scene: Scene, frame: Frame, tear: void, pins: void, colliders: Collider[], stats: Stats,
  *   hello: Hello, node: NodeState, parameters: Parameters, timeline: TimelineMessage | null, playback: Playback | null,
+ *   ghost: import("../net/messages.js").GhostMessage,
  *   outcome: import("../net/messages.js").OutcomeMessage, reset: number,
  *   notice: { level: string, text: string }, ground: void, connection: boolean,
  *   history: HistoryMessage | null, undoable: void, recording: RecordingMessage, past: number | null, present: Frame,
@@ -87,6 +88,12 @@ export class Simulation extends Emitter {
     this.timeline = null;
     /** @type {Playback | null} */
     this.playback = null;
+    /** The state of another recording beside the frame, if there is one. @type {import("../net/wire.js").Ghost | null} */
+    this.ghost = null;
+    /** The next ghost: its frame follows. @type {import("../net/wire.js").Ghost | null} */
+    this.nextGhost = null;
+    /** What is known of the other recording. @type {import("../net/messages.js").GhostMessage | null} */
+    this.ghostChoice = null;
     /** The past of a live simulation that the page can look back at. @type {HistoryMessage | null} */
     this.history = null;
     /** The recording that the bridge makes, or the last one. @type {RecordingMessage | null} */
@@ -165,6 +172,7 @@ export class Simulation extends Emitter {
     else if (message.kind === "forces") this.awaiting.forces = message;
     else if (message.kind === "speeds") this.awaiting.speeds = message;
     else if (message.kind === "inspected") this.awaiting.inspected = message;
+    else if (message.kind === "ghost") this.nextGhost = message;
     else if (message.kind === "colliders") this.receiveColliders(message.colliders);
   }
 
@@ -225,6 +233,7 @@ export class Simulation extends Emitter {
     this.pins = new Map();
     this.colliders = [];
     this.forces = this.speeds = this.inspected = null;
+    this.ghost = this.nextGhost = null;
     this.awaiting = { forces: null, speeds: null, inspected: null };
     this.nonFinite = [];
     this.ground = null;
@@ -244,6 +253,7 @@ export class Simulation extends Emitter {
     this.forces = forces?.step === frame.step ? forces : null;
     this.speeds = speeds?.step === frame.step ? speeds : null;
     this.inspected = inspected?.step === frame.step ? inspected : null;
+    [this.ghost, this.nextGhost] = [this.nextGhost, null];
     if (!sameNumbers(frame.nonFinite, this.nonFinite)) {
       this.nonFinite = frame.nonFinite.slice();
       this.rebuild();
@@ -343,6 +353,7 @@ export class Simulation extends Emitter {
     this.undoable = null;
     this.emit("history", null);
     this.emit("undoable", undefined);
+    this.ghostChoice = null;
     if (hello.mode === "live") {
       this.timeline = null;
       this.playback = null;
@@ -394,6 +405,7 @@ export class Simulation extends Emitter {
       case "undoable": this.undoable = message.what; return this.emit("undoable", undefined);
       case "recording": this.recording = message; return this.emit("recording", message);
       case "history": this.history = message; return this.emit("history", message);
+      case "ghost": this.ghostChoice = message; return this.emit("ghost", message);
       case "playback": this.playback = message; return this.emit("playback", message);
       case "outcome": return this.emit("outcome", message);
       case "reset": return this.receiveReset(message.step);

@@ -12,6 +12,7 @@ const KINDS = {
   pin: ["--plot-a", 1, "pins"],
   command: ["--plot-c", 1, "commands"],
   late: ["--plot-b", 2, "late steps"],
+  ghost: ["--ghost", 2, "first difference"],
 };
 const ROW_HEIGHT = 5;
 /** Distance in pixels at which the pointer is at a mark. */
@@ -26,6 +27,7 @@ export function describe({ kind, step, count, commands = [] }, clock) {
 /** @param {string} kind @param {number} count @param {string[]} commands */
 function what(kind, count, commands) {
   if (kind === "tear") return `${count} ${count === 1 ? "constraint" : "constraints"} torn`;
+  if (kind === "ghost") return "the ghost differs from here on";
   if (kind === "late") return `${count} late ${count === 1 ? "step" : "steps"}`;
   const names = commands.join(", ") || kind;
   return count > Math.max(1, commands.length) ? `${names} (${count} commands)` : names;
@@ -99,7 +101,7 @@ export class MarkRow {
     const counts = new Map();
     for (const { kind, count } of this.marks) counts.set(kind, (counts.get(kind) ?? 0) + count);
     const kinds = Object.keys(KINDS).filter((kind) => counts.has(kind));
-    const text = kinds.map((kind) => `${KINDS[kind][2]} ${counts.get(kind)}`);
+    const text = kinds.map((kind) => (kind === "ghost" ? KINDS[kind][2] : `${KINDS[kind][2]} ${counts.get(kind)}`));
     if (this.legend.textContent === text.join("")) return;
     this.legend.replaceChildren(...kinds.map((kind, index) => {
       const item = make("li", {}, text[index]);

@@ -32,7 +32,11 @@ export class ReplayTrack {
     /** The part of the recording on show. */
     this.current = { first: 0, last: 0 };
     this.file = find("file", HTMLSelectElement);
+    this.ghost = find("ghost", HTMLSelectElement);
+    this.ghostNote = find("ghost-note", HTMLOutputElement);
     this.hashes = find("hashes", HTMLOutputElement);
+    /** Recordings of the folder. @type {string[]} */
+    this.names = [];
     this.onChange = () => {};
     this.play.addEventListener("click", () => commands.run(simulation.playback?.is_playing ? "pause" : "resume"));
     this.loop.addEventListener("click", () => commands.run("loop", { is_on: !(simulation.playback?.is_looping ?? false) }));
@@ -42,6 +46,8 @@ export class ReplayTrack {
     find("track", HTMLElement).addEventListener("wheel", (event) => this.zoomBy(event), { passive: false });
     this.rate.addEventListener("change", () => commands.run("rate", { value: Number(this.rate.value) }));
     this.file.addEventListener("change", () => { location.href = addressBeside(location.pathname, this.file.value); });
+    this.ghost.addEventListener("change", () => commands.run("ghost", this.ghost.value === "" ? {} : { name: this.ghost.value }));
+    simulation.on("ghost", () => this.showGhost());
     simulation.on("hello", ({ recordings = [] }) => this.showFiles(recordings));
     simulation.on("timeline", () => this.showRecording());
     simulation.on("playback", () => this.showPlayback());
@@ -57,7 +63,9 @@ export class ReplayTrack {
   }
 
   get marks() {
-    return this.simulation.timeline?.marks ?? [];
+    const marks = this.simulation.timeline?.marks ?? [];
+    const step = this.simulation.ghostChoice?.first_different_step ?? null;
+    return step === null ? marks : [...marks, { kind: /** @type {const} */ ("ghost"), step, count: 1 }];
   }
 
   get place() {
@@ -142,6 +150,7 @@ export class ReplayTrack {
       this.hashes.classList.toggle("is-bad", timeline.hashes === "diverged");
       this.hashes.title = timeline.file;
       this.showFile();
+      this.showGhost();
     }
     this.onChange();
   }
@@ -150,18 +159,40 @@ export class ReplayTrack {
   showFiles(names) {
     find("file-choice", HTMLElement).hidden = names.length < 2;
     this.file.replaceChildren(...names.map((name) => make("option", { value: name }, name)));
+    this.names = names;
     this.showFile();
+    this.showGhost();
+  }
+
+  /** Offers the other recordings as ghosts, and shows the comparison with the chosen one. */
+  showGhost() {
+    const { ghostChoice } = this.simulation;
+    const given = ghostChoice?.given ?? null;
+    const others = this.names.filter((name) => name !== this.shownName && name !== given);
+    const names = given === null ? others : [given, ...others];
+    find("ghost-choice", HTMLElement).hidden = names.length === 0;
+    this.ghost.replaceChildren(make("option", { value: "" }, "none"), ...names.map((name) => make("option", { value: name }, name)));
+    this.ghost.value = ghostChoice?.name ?? "";
+    this.ghostNote.textContent = this.ghostNote.title = ghostChoice?.text ?? "";
+    this.ghostNote.classList.toggle("is-good", ghostChoice?.state === "equal");
+    this.ghostNote.classList.toggle("is-bad", ghostChoice?.state === "failed");
+    this.onChange();
+  }
+
+  /** Name of the recording on show. */
+  get shownName() {
+    return this.simulation.timeline?.file.replace(/\.mcap$/, "") ?? "";
   }
 
   /** Chooses the recording on show. */
   showFile() {
-    this.file.value = this.simulation.timeline?.file.replace(/\.mcap$/, "") ?? "";
+    this.file.value = this.shownName;
   }
 
   /** Disables the controls without a connection. */
   showConnection() {
     const reason = this.simulation.isConnected ? "" : "There is no connection to the bridge.";
-    for (const control of [this.play, this.loop, this.loopStart, this.loopEnd, this.rate, this.zoom, this.file]) enable(control, reason);
+    for (const control of [this.play, this.loop, this.loopStart, this.loopEnd, this.rate, this.zoom, this.file, this.ghost]) enable(control, reason);
     this.showPlayback();
   }
 

@@ -28,12 +28,18 @@ export class Hud {
 
   /** @param {number} drawnPerSecond */
   text(drawnPerSecond) {
-    const { frame, scene, stats, torn } = this.simulation;
+    const { frame, ghost, scene, stats, torn } = this.simulation;
     if (frame === null || scene === null) return "";
     const factor = stats === null || !Number.isFinite(stats.realTimeFactor) ? "" : ` · ${trim(stats.realTimeFactor)} × real time`;
     // A paused scene is drawn on demand, so it has no meaningful rate.
     const pace = this.simulation.isLookingBack ? " · in the past" : !this.simulation.isAlive ? " · last state" : this.simulation.isPaused ? " · paused" : `${factor} · ${drawnPerSecond} fps`;
     const tears = torn.length > 0 ? ` · ${torn.length} torn` : "";
-    return `step ${frame.step} · ${frame.simTime.toFixed(2)} s${pace} · ${scene.particleCount} particles · ${scene.constraintCount} constraints${tears}`;
+    return `step ${frame.step} · ${frame.simTime.toFixed(2)} s${pace} · ${scene.particleCount} particles · ${scene.constraintCount} constraints${tears}${ghost === null ? "" : ` · ${apart(ghost)}`}`;
   }
+}
+
+/** The distance of the ghost from the state on show. @param {import("../net/wire.js").Ghost} ghost */
+function apart({ distance, farthest, step }) {
+  if (Number.isNaN(distance)) return `ghost at step ${step}`;
+  return distance === 0 ? "ghost at the same place" : `ghost up to ${trim(distance)} m away (particle ${farthest})`;
 }

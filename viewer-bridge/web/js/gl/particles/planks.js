@@ -1,9 +1,9 @@
 // The planks of a bridge: boards between its ropes, instances of one cube that the vertex shader places.
 
-import { STICK } from "../state/topology.js";
-import { Program, UNITS } from "./context.js";
-import { BLUR, HEADER, LIGHT, SCREEN, SHADOW, positionReader, sunlight } from "./shaders.js";
-import { VERTEX_FLOATS, cube } from "./solids.js";
+import { STICK } from "../../state/topology.js";
+import { Program, UNITS } from "../context.js";
+import { BLUR, HEADER, LIGHT, SCREEN, SHADOW, positionReader, sunlight } from "../shaders.js";
+import { VERTEX_FLOATS, cube } from "../solids.js";
 
 /** Words per instance: the left ends of the plank, of the one before it and of the one after it. The right ends follow them. */
 const WORDS = 3;
@@ -75,7 +75,7 @@ void main() {
 `;
 
 export class Planks {
-  /** @param {WebGL2RenderingContext} gl @param {import("./context.js").Variant} variant */
+  /** @param {WebGL2RenderingContext} gl @param {import("../context.js").Variant} variant */
   constructor(gl, { isQuantised, hasEffects }) {
     this.gl = gl;
     this.program = new Program(gl, vertex(isQuantised), fragment(hasEffects));
@@ -101,7 +101,7 @@ export class Planks {
     gl.bindVertexArray(null);
   }
 
-  /** Lists the planks whose constraint is not torn. @param {import("../state/shapes.js").Plank[]} planks @param {Uint8Array} styles of all constraints */
+  /** Lists the planks whose constraint is not torn. @param {import("../../state/shapes.js").Plank[]} planks @param {Uint8Array} styles of all constraints */
   set(planks, styles) {
     const { gl } = this;
     const whole = planks.filter(({ constraint }) => (styles[constraint] & STICK.isGone) === 0);

@@ -1,10 +1,10 @@
 // Constraints as sticks. Each is one instanced quad around a capsule on the screen, because WebGL lines
 // are only one pixel wide.
 
-import { CONSTRAINT } from "../net/wire.js";
-import { STICK } from "../state/topology.js";
-import { Program, UNITS } from "./context.js";
-import { BLUR, CORNER, HEADER, HEAT, LIGHT, PAINT, SCREEN, SHADOW, VALUES, positionReader, sunlight } from "./shaders.js";
+import { CONSTRAINT } from "../../net/wire.js";
+import { STICK } from "../../state/topology.js";
+import { Program, UNITS } from "../context.js";
+import { BLUR, CORNER, HEADER, HEAT, LIGHT, PAINT, SCREEN, SHADOW, VALUES, positionReader, sunlight } from "../shaders.js";
 
 /** Words per instance: two ends, rest length and gain as f32 bits, style, radius as a solid body as f32 bits. */
 const WORDS = 6;
@@ -36,7 +36,7 @@ void place(float alpha) {}
 `;
 
 /** Computes the ends in pixels, and the quad around them. Divides by w here, so that interpolation is
- * linear on the screen. Clips an end behind the eye to the near plane. @param {import("./context.js").Variant} variant */
+ * linear on the screen. Clips an end behind the eye to the near plane. @param {import("../context.js").Variant} variant */
 const vertex = ({ isQuantised }) => `${HEADER}${SHADOW}${CORNER}
 layout(location = 0) in uvec2 a_ends;
 layout(location = 1) in float a_rest_length;
@@ -102,7 +102,7 @@ void main() {
 }
 `;
 
-/** @param {import("./context.js").Variant} variant */
+/** @param {import("../context.js").Variant} variant */
 const fragment = ({ hasEffects }) => `${HEADER}${SHADOW}${SCREEN}${HEAT}
 flat in vec3 v_ends[2];
 flat in float v_radius;
@@ -144,7 +144,7 @@ void main() {
 `;
 
 export class Sticks {
-  /** @param {WebGL2RenderingContext} gl @param {import("./context.js").Variant} variant */
+  /** @param {WebGL2RenderingContext} gl @param {import("../context.js").Variant} variant */
   constructor(gl, variant) {
     this.gl = gl;
     this.program = new Program(gl, vertex(variant), fragment(variant));
@@ -156,7 +156,7 @@ export class Sticks {
     this.words = new Uint32Array(0);
   }
 
-  /** @param {import("../state/topology.js").Topology} topology @param {Uint32Array} drawn @param {Float32Array} radii of all constraints */
+  /** @param {Pick<import("../../state/topology.js").Topology, "scene" | "styles" | "gains">} topology @param {Uint32Array} drawn @param {Float32Array} radii of all constraints */
   setSticks({ scene, styles, gains }, drawn, radii) {
     const { gl } = this;
     this.drawn = drawn;
@@ -193,7 +193,7 @@ export class Sticks {
     gl.bufferData(gl.ARRAY_BUFFER, this.words, gl.DYNAMIC_DRAW);
   }
 
-  /** Uploads the styles and gains again. @param {import("../state/topology.js").Topology} topology */
+  /** Uploads the styles and gains again. @param {Pick<import("../../state/topology.js").Topology, "styles" | "gains">} topology */
   update({ styles, gains }) {
     const { gl } = this;
     const floats = new Float32Array(this.words.buffer);
@@ -214,5 +214,11 @@ export class Sticks {
     gl.bindVertexArray(this.vao);
     gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, this.drawn.length);
     gl.bindVertexArray(null);
+  }
+
+  delete() {
+    this.gl.deleteVertexArray(this.vao);
+    this.gl.deleteBuffer(this.buffer);
+    this.program.delete();
   }
 }

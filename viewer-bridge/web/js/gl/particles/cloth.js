@@ -1,8 +1,8 @@
 // The surface: two-sided cloth. The vertex shader computes the normal of a particle from the intact
 // triangles around it, so after a tear the CPU only lists the triangles that are gone.
 
-import { Program, UNITS } from "./context.js";
-import { BLUR, HEADER, HEAT, LIGHT, PAINT, SCREEN, SHADOW, VALUES, positionReader, sunlight } from "./shaders.js";
+import { Program, UNITS } from "../context.js";
+import { BLUR, HEADER, HEAT, LIGHT, PAINT, SCREEN, SHADOW, VALUES, positionReader, sunlight } from "../shaders.js";
 
 /** Defines surface_position(vertex, particle): a vertex is a particle, or moves with one (state/splits.js). */
 const SURFACE_POSITION = `
@@ -99,7 +99,7 @@ void main() {
 }
 `;
 
-/** @param {import("./context.js").Variant} variant */
+/** @param {import("../context.js").Variant} variant */
 const vertex = ({ isQuantised, hasEffects }) => `${HEADER}
 uniform mat4 u_view_projection;
 out vec3 v_position;
@@ -109,7 +109,7 @@ out float v_known;
 out vec2 v_flat_place;
 ${positionReader(isQuantised)}${VALUES}${SURFACE_POSITION}${hasEffects ? FLAT_PLACE : NO_FLAT_PLACE}${NORMAL_FROM_FAN}`;
 
-/** @param {import("./context.js").Variant} variant */
+/** @param {import("../context.js").Variant} variant */
 const fragment = ({ hasEffects }) => `${HEADER}${SCREEN}${LIGHT}${HEAT}${sunlight(hasEffects)}${hasEffects ? WEAVE : NO_WEAVE}
 in vec3 v_position;
 in vec3 v_normal;
@@ -161,7 +161,7 @@ void main() {
 `;
 
 export class Cloth {
-  /** @param {WebGL2RenderingContext} gl @param {import("./context.js").Variant} variant */
+  /** @param {WebGL2RenderingContext} gl @param {import("../context.js").Variant} variant */
   constructor(gl, variant) {
     this.gl = gl;
     this.program = new Program(gl, vertex(variant), fragment(variant));

@@ -1,7 +1,7 @@
 // Particles as small balls; marks of pinned, anchored, grabbed and frozen particles as discs with a white ring.
 
-import { Program, UNITS } from "./context.js";
-import { HEADER, HEAT, PAINT, SCREEN, SHADOW, VALUES, positionReader } from "./shaders.js";
+import { Program, UNITS } from "../context.js";
+import { HEADER, HEAT, PAINT, SCREEN, SHADOW, VALUES, positionReader } from "../shaders.js";
 
 /** Styles of a point, as the shader numbers them. */
 export const POINT = Object.freeze({ particle: 0, pin: 1, anchor: 2, grabbed: 3, frozen: 4 });

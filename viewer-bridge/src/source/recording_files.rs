@@ -22,7 +22,7 @@ fn is_plain(letter: char) -> bool {
 
 /// Returns a path in the folder that no recording has: the scene and the time in UTC, and a number if
 /// that is taken.
-pub(super) fn free_path(folder: &Path, scene: &str, now_ns: u64) -> PathBuf {
+pub(crate) fn free_path(folder: &Path, scene: &str, now_ns: u64) -> PathBuf {
     let scene: String = scene.chars().take(SCENE_LENGTH_MAX).collect();
     let scene = scene.replace(|letter| !is_plain(letter), "-");
     let scene = if scene.is_empty() { "recording" } else { &scene };
@@ -38,7 +38,7 @@ pub(super) fn free_path(folder: &Path, scene: &str, now_ns: u64) -> PathBuf {
 }
 
 /// Returns the name under which a page opens a recording.
-pub(super) fn name_of(path: &Path) -> Option<String> {
+pub(crate) fn name_of(path: &Path) -> Option<String> {
     path.file_stem().and_then(|stem| stem.to_str()).map(str::to_owned)
 }
 
@@ -52,12 +52,12 @@ fn is_name(name: &str) -> bool {
 }
 
 /// Returns the path of the recording `name` in the folder; `None` if the name is not valid.
-pub(in crate::pages) fn path_of(folder: &Path, name: &str) -> Option<PathBuf> {
+pub(crate) fn path_of(folder: &Path, name: &str) -> Option<PathBuf> {
     is_name(name).then(|| folder.join(format!("{name}.{ENDING}")))
 }
 
 /// Returns the names of the recordings in a folder, newest first. Empty if the folder cannot be read.
-pub(in crate::pages) fn names_in(folder: &Path) -> Vec<String> {
+pub(crate) fn names_in(folder: &Path) -> Vec<String> {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     let mut found: Vec<_> = entries
         .map(|entry| entry.path())

@@ -1,0 +1,80 @@
+//! Finds the first step at which two recordings differ.
+
+use std::cmp::Ordering;
+use std::path::Path;
+
+use recorder::verification::first_difference;
+use recorder::{FileSource, Frame, FrameReader, LogEnd, LogReader, ReadError};
+use sim_contract::Stop;
+
+/// The result of a comparison, up to the first difference.
+#[derive(Debug, Default)]
+pub(super) struct Compared {
+    /// Number of equal steps that both have.
+    pub(super) common_steps: u64,
+    pub(super) first: Option<FirstDifference>,
+    /// Where each file ends that lacks its end; otherwise empty.
+    pub(super) ends: [String; 2],
+}
+
+/// The first difference.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) struct FirstDifference {
+    pub(super) step: u64,
+    /// The particle and the field, for the user.
+    pub(super) place: String,
+}
+
+/// Compares the hashes and every bit of the particles in the steps that both files have, up to the first
+/// difference. `on_step` is called after each, and returns whether to go on.
+///
+/// # Errors
+/// A file cannot be read, or a signal has arrived.
+pub(super) fn compare(
+    paths: [&Path; 2],
+    stop: &Stop,
+    mut on_step: impl FnMut(u64) -> bool,
+) -> Result<Compared, ReadError> {
+    let [mut a, mut b] = [open(paths[0], stop)?, open(paths[1], stop)?];
+    let mut compared = Compared::default();
+    let (mut frame_a, mut frame_b) = (a.next_frame()?, b.next_frame()?);
+    while let (Some(one), Some(other)) = (&frame_a, &frame_b) {
+        let order = one.row.step.cmp(&other.row.step);
+        if order == Ordering::Equal {
+            compared.first = difference(one, other);
+            if compared.first.is_some() {
+                return Ok(compared);
+            }
+            compared.common_steps += 1;
+        }
+        if !on_step(one.row.step) {
+            return Ok(compared);
+        }
+        if order != Ordering::Greater {
+            frame_a = a.next_frame()?;
+        }
+        if order != Ordering::Less {
+            frame_b = b.next_frame()?;
+        }
+    }
+    compared.ends = [a, b].map(|reader| end_text(reader.end()));
+    Ok(compared)
+}
+
+fn open(path: &Path, stop: &Stop) -> Result<FrameReader<FileSource>, ReadError> {
+    LogReader::open_until(path, stop).map(FrameReader::new)
+}
+
+fn end_text(end: Option<&LogEnd>) -> String {
+    end.filter(|end| **end != LogEnd::Complete).map(ToString::to_string).unwrap_or_default()
+}
+
+fn difference(a: &Frame, b: &Frame) -> Option<FirstDifference> {
+    let step = a.row.step;
+    if let Some(found) = first_difference(a.payload(), b.payload()) {
+        let place = format!("particle {}, {}", found.particle, found.field);
+        return Some(FirstDifference { step, place });
+    }
+    (a.row.state_hash != b.row.state_hash)
+        .then(|| FirstDifference { step, place: "the torn constraints".to_owned() })
+}

@@ -1,0 +1,151 @@
+//! The thread of a ghost: opens the recording, and compares it with the one on show.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::Sender;
+
+use anyhow::{Context, bail};
+use recorder::Tape;
+use sim_contract::clock::{SECOND_NS, monotonic_ns};
+use sim_contract::{ConstraintState, Stop};
+
+use super::super::open::{self, Recording};
+use super::comparison::{Compared, compare};
+use super::file_of;
+use crate::message::GhostState;
+
+/// Time between two reports.
+const REPORT_PERIOD_NS: u64 = SECOND_NS / 2;
+
+/// What the thread reports.
+#[derive(Debug)]
+pub(super) enum Report {
+    /// The ghost is open, and has the particles and constraints of the recording on show.
+    Opened(Box<Tape>),
+    /// The comparison.
+    Progress { state: GhostState, text: String, first_different_step: Option<u64> },
+}
+
+/// The recording on show.
+#[derive(Debug)]
+pub(super) struct Shown {
+    path: PathBuf,
+    file: String,
+    particle_count: u32,
+    rate_hz: u32,
+    constraints: Vec<ConstraintState>,
+}
+
+impl Shown {
+    pub(super) fn of(recording: &Recording) -> Self {
+        let run = recording.tape.run();
+        Self {
+            path: recording.path.clone(),
+            file: recording.file.clone(),
+            particle_count: run.particle_count,
+            rate_hz: run.rate_hz,
+            constraints: recording.load.constraints.clone(),
+        }
+    }
+
+    /// Checks that the states of another recording can be compared with this one's, particle by particle.
+    fn check(&self, ghost: &Recording) -> anyhow::Result<()> {
+        let run = ghost.tape.run();
+        let remedy = "a ghost must be a recording of the same particles and constraints";
+        if run.particle_count != self.particle_count {
+            let (own, other) = (self.particle_count, run.particle_count);
+            bail!("it has {other} particles instead of {own}; {remedy}");
+        }
+        let ends = |constraints: &[ConstraintState]| -> Vec<_> {
+            constraints.iter().map(|one| (one.a, one.b)).collect()
+        };
+        if ends(&ghost.load.constraints) != ends(&self.constraints) {
+            bail!("its constraints join other particles; {remedy}");
+        }
+        if run.rate_hz != self.rate_hz {
+            let (own, other) = (self.rate_hz, run.rate_hz);
+            bail!(
+                "it has {other} steps per second instead of {own}, so equal steps are different times"
+            );
+        }
+        Ok(())
+    }
+}
+
+/// A ghost to open and compare.
+#[derive(Debug)]
+pub(super) struct Job {
+    pub(super) shown: Shown,
+    pub(super) name: String,
+    pub(super) path: PathBuf,
+    pub(super) stop: Stop,
+    pub(super) is_cancelled: Arc<AtomicBool>,
+}
+
+impl Job {
+    /// Runs to the end, or until the ghost is no longer chosen.
+    pub(super) fn run(self, reports: &Sender<Report>) {
+        let result = self.open_and_compare(reports);
+        let report = match result {
+            Ok(compared) => self.result(&compared),
+            Err(error) => Report::Progress {
+                state: GhostState::Failed,
+                text: format!("{}: {error:#}", self.name),
+                first_different_step: None,
+            },
+        };
+        // Nobody receives the reports of a ghost that is no longer chosen.
+        let _sent = reports.send(report);
+    }
+
+    fn open_and_compare(&self, reports: &Sender<Report>) -> anyhow::Result<Compared> {
+        let ghost = open::open(&self.path, &self.stop, &mut |_| {})?;
+        self.shown.check(&ghost)?;
+        let (first, last) = (ghost.tape.first_step(), ghost.tape.last_step());
+        let _sent = reports.send(Report::Opened(Box::new(ghost.tape)));
+        let mut next_report_ns = monotonic_ns();
+        let on_step = |step: u64| {
+            if monotonic_ns() >= next_report_ns {
+                next_report_ns = monotonic_ns() + REPORT_PERIOD_NS;
+                let percent = 100 * step.saturating_sub(first) / (last - first).max(1);
+                let text = format!("comparing with {}: {percent} %", self.name);
+                let (state, first_different_step) = (GhostState::Comparing, None);
+                let _sent = reports.send(Report::Progress { state, text, first_different_step });
+            }
+            !self.is_cancelled.load(Ordering::Relaxed)
+        };
+        compare([&self.shown.path, &self.path], &self.stop, on_step).context("comparing")
+    }
+
+    /// Puts the result into words.
+    fn result(&self, compared: &Compared) -> Report {
+        let Self { name, shown, .. } = self;
+        let mut first_different_step = None;
+        let (state, mut text) = match (&compared.first, compared.common_steps) {
+            (Some(first), _) => {
+                first_different_step = Some(first.step);
+                let time_s = first.step as f64 / f64::from(shown.rate_hz);
+                let place = &first.place;
+                let text =
+                    format!("{name} differs from step {} ({time_s:.3} s): {place}", first.step);
+                (GhostState::Different, text)
+            }
+            (None, 0) => {
+                let text = format!("{name} has no recorded step of this one");
+                (GhostState::Failed, text)
+            }
+            (None, count) => {
+                let text = format!("{name}: {count} common steps, equal in every bit");
+                (GhostState::Equal, text)
+            }
+        };
+        if compared.first.is_none() {
+            let files = [shown.file.clone(), file_of(&self.path)];
+            for (file, end) in files.iter().zip(&compared.ends).filter(|(_, end)| !end.is_empty()) {
+                text += &format!("; {file} is {end}");
+            }
+        }
+        Report::Progress { state, text, first_different_step }
+    }
+}

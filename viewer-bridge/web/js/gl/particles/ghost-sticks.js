@@ -1,0 +1,64 @@
+// The ghost of a replay: the constraints of another recording as thin sticks, fainter where something hides them.
+
+import { CONSTRAINT } from "../../net/wire.js";
+import { STICK, drawnSticks } from "../../state/topology.js";
+import { ArrayTexture, UNITS, layouts } from "../context.js";
+import { PAINT } from "../shaders.js";
+import { Sticks } from "./sticks.js";
+
+/** Opacity in front of everything else, and behind something. */
+const OPACITY = { visible: 0.9, hidden: 0.25 };
+
+/** The constraints that show the shape: structural ones, or all if there are none. @param {import("../../net/wire.js").Scene} scene @param {number} limit */
+function ghostSticks(scene, limit) {
+  const drawn = drawnSticks(scene, limit);
+  const structural = drawn.filter((constraint) => scene.constraintKinds[constraint] === CONSTRAINT.structural);
+  return structural.length > 0 ? structural : drawn;
+}
+
+export class GhostSticks {
+  /** @param {WebGL2RenderingContext} gl @param {import("../../state/topology.js").Topology} topology @param {number} limit number of sticks at most */
+  constructor(gl, { scene }, limit) {
+    this.gl = gl;
+    this.scene = scene;
+    this.sticks = new Sticks(gl, { isQuantised: false, hasEffects: false });
+    this.positions = new ArrayTexture(gl, UNITS.u_positions, layouts(gl).f32x3, scene.particleCount);
+    this.styles = Uint8Array.from(scene.constraintKinds);
+    this.gains = new Float32Array(scene.constraintCount);
+    /** Constraints that the ghost lacks. */
+    this.hidden = new Uint32Array(0);
+    this.sticks.setSticks({ scene, styles: this.styles, gains: this.gains }, ghostSticks(scene, limit), new Float32Array(scene.constraintCount));
+  }
+
+  /** @param {import("../../net/wire.js").Ghost} ghost */
+  write(ghost) {
+    if (ghost.positions.length > 0) this.positions.write(ghost.positions);
+    if (String(ghost.hidden) === String(this.hidden)) return;
+    this.hidden = ghost.hidden.slice();
+    this.styles.set(this.scene.constraintKinds);
+    for (const constraint of this.hidden) this.styles[constraint] |= STICK.isGone;
+    this.sticks.update(this);
+  }
+
+  /** Draws over the picture. Afterwards, the positions are those of `others` again.
+   * @param {Record<string, number | number[]>} uniforms @param {ArrayTexture} others @param {boolean} isFlat */
+  draw(uniforms, others, isFlat) {
+    const { gl } = this;
+    const ghost = { ...uniforms, u_lo: [0, 0, 0], u_scale: [1, 1, 1], u_paint: PAINT.off, u_is_all: 1, u_is_solid: 0, u_radius: 0, u_round: 0 };
+    this.positions.bind();
+    if (!isFlat) {
+      gl.depthMask(false);
+      gl.depthFunc(gl.GREATER);
+      this.sticks.draw({ ...ghost, u_opacity: OPACITY.hidden });
+      gl.depthMask(true);
+      gl.depthFunc(gl.LEQUAL);
+    }
+    this.sticks.draw({ ...ghost, u_opacity: OPACITY.visible });
+    others.bind();
+  }
+
+  delete() {
+    this.positions.delete();
+    this.sticks.delete();
+  }
+}
