@@ -6,7 +6,7 @@ use integration_tests::{Process, Program, Sandbox, ctl, record, wait_for};
 use recorder::{FrameReader, LogReader};
 
 use crate::picture::{ERROR_MAX, NAMED, SWINGING, errors};
-use crate::support::{Button, ReplayRig};
+use crate::support::{Area, Button, ReplayRig, is_ghost};
 
 /// A view in which the swinging sheet stays within the picture.
 const VIEW: &str = "show.particles=1&camera=0.5,-0.35,0,3,0.42,0.16";
@@ -229,4 +229,55 @@ fn a_live_bridge_at_the_address_of_a_replay_shows_its_own_timeline() {
     replay.go_live("curtain");
     replay.tab.wait("viewer.connection === 'open' && viewer.scene === 'curtain'");
     replay.tab.wait(&format!("!{playback} && viewer.step > 0 && viewer.mode === 'live'"));
+}
+
+#[test]
+#[ignore = "needs Chromium"]
+fn another_recording_is_drawn_as_a_ghost_where_its_particles_are() {
+    let sandbox = Sandbox::new();
+    let folder = sandbox.path("runs");
+    std::fs::create_dir(&folder).unwrap();
+    // The sideways gravity swings the second rope far away from the first.
+    let commands = sandbox.write(
+        "commands.jsonl",
+        r#"{"step":10,"kind":"set","parameter":"gravity","value":[6,-9.81,0]}"#,
+    );
+    let simulate = |name: &str, more: &[&str]| {
+        let file = format!("{folder}/{name}.mcap");
+        let args = ["simulate", "rope", "--steps", "120", "-o", &file];
+        Process::run(Program::Recorder, &sandbox, &[&args, more].concat()).success();
+        file
+    };
+    let changed = simulate("changed", &["--commands", &commands]);
+    simulate("plain", &[]);
+    let end = *recorded(&changed)[120].last().unwrap();
+
+    let replay = ReplayRig::open(sandbox, &folder, "");
+    let tab = &replay.tab;
+    tab.wait("document.querySelector('#file').value === 'plain' && viewer.frame >= 0");
+    let choose = |name: &str| {
+        tab.evaluate(&format!(
+            "void (ghost => {{ ghost.value = '{name}'; ghost.dispatchEvent(new Event('change')); }})(document.querySelector('#ghost'))"
+        ));
+    };
+    let ghost_pixels = || {
+        let area = Area::around(tab.camera().project(end), 12.0);
+        tab.drawn(area).count(&area, is_ghost)
+    };
+    choose("changed");
+    tab.wait("document.querySelector('#ghost-note').textContent.startsWith('changed differs from step 10')");
+    // The mark of the first difference, and then the end.
+    tab.key('>');
+    tab.wait("viewer.step === 10");
+    tab.evaluate("void (seek => { seek.value = 120; seek.dispatchEvent(new Event('input')); })(document.querySelector('#seek'))");
+    tab.wait(
+        "viewer.step === 120 && document.querySelector('#hud').textContent.includes('ghost up to')",
+    );
+    tab.key('f');
+    let drawn = ghost_pixels();
+    assert!(drawn > 20, "{drawn} pixels of the ghost at its end");
+    choose("");
+    tab.wait("document.querySelector('#ghost-note').textContent === ''");
+    tab.wait("!document.querySelector('#hud').textContent.includes('ghost')");
+    assert_eq!(ghost_pixels(), 0);
 }

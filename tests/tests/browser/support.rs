@@ -8,7 +8,9 @@ mod rig;
 mod tab;
 
 pub(crate) use camera::{Camera, distance};
-pub(crate) use picture::{Area, Picture, is_cloth, is_force, is_grab_mark, is_particle, is_pin};
+pub(crate) use picture::{
+    Area, Picture, is_cloth, is_force, is_ghost, is_grab_mark, is_particle, is_pin,
+};
 pub(crate) use replay::ReplayRig;
 pub(crate) use rig::{Rig, State};
 pub(crate) use tab::{Button, Tab};

@@ -5,6 +5,7 @@
 #[path = "../../../viewer-bridge/tests/sockets/foxglove_client.rs"]
 #[allow(dead_code, reason = "its other half is used by the tests that have no node")]
 mod foxglove_client;
+mod ghost;
 mod page;
 mod recording;
 mod replay;

@@ -131,6 +131,11 @@ pub(crate) fn is_force([red, green, blue]: Color) -> bool {
     red < 60 && green > 120 && (100..170).contains(&blue)
 }
 
+/// The ghost of a replay in the light scheme: a medium blue.
+pub(crate) fn is_ghost([red, green, blue]: Color) -> bool {
+    blue > 150 && red < 100 && (80..170).contains(&green)
+}
+
 /// The mark of a pinned particle: blue.
 pub(crate) fn is_pin([red, green, blue]: Color) -> bool {
     blue > 170 && red < 120 && green < 160

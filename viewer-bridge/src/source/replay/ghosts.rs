@@ -5,7 +5,7 @@
 mod comparison;
 mod job;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, channel};
@@ -226,11 +226,6 @@ fn hidden(ghost: &TapeState, constraints: &[ConstraintState]) -> Vec<u32> {
     hidden
 }
 
-/// Returns the file of a path without its folder, which pages need not know.
-fn file_of(path: &Path) -> String {
-    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
-}
-
 #[cfg(test)]
 mod tests {
     use recorder::StepRow;
@@ -272,6 +267,6 @@ mod tests {
     }
 
     fn torn(constraint: u32, cause: u32) -> sim_contract::TornConstraint {
-        sim_contract::TornConstraint { constraint, cause, ..Default::default() }
+        sim_contract::TornConstraint { constraint, cause }
     }
 }

@@ -67,9 +67,12 @@ pub(super) fn open(
     }
     let load = load_of(&tape)?;
     let first = tape.state_at(tape.first_step()).map_err(|error| with_remedy(path, error))?;
-    let name = path.file_name().unwrap_or(path.as_os_str());
-    let file = name.to_string_lossy().into_owned();
-    Ok(Recording { tape, load, first, path: path.to_owned(), file })
+    Ok(Recording { tape, load, first, path: path.to_owned(), file: file_of(path) })
+}
+
+/// Returns the file of a path without its folder, which clients need not know.
+pub(super) fn file_of(path: &Path) -> String {
+    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
 }
 
 /// Says where a file ends that lacks its end, and how to keep the rest of it. Empty if it is complete.

@@ -15,6 +15,8 @@ const POINT_ROOM = 0.5;
 /** Greatest distance of a floor and of a solid that are still framed, in sizes of the scene. */
 const FLOOR_SIZES = 3;
 const SOLID_SIZES = 1;
+/** Greatest distance of a particle of a ghost that is still framed, in sizes of the scene: parts that fell away are not. */
+const GHOST_SIZES = 2;
 /** Margin on each side of a scene that anchors move, and of a flag in the wind, as fractions of its size. */
 const CARRIED_ROOM = 0.2;
 const FLYING_ROOM = 0.04;
@@ -45,13 +47,25 @@ export function firstViewBox(simulation) {
   return box;
 }
 
-/** The box of the scene as it is now, with the solids beside it. @param {import("./simulation.js").Simulation} simulation @returns {Box} */
+/** The box of the scene as it is now, with the ghost and the solids beside it. @param {import("./simulation.js").Simulation} simulation @returns {Box} */
 export function fittedBox(simulation) {
   const bounds = simulation.colliders.find((one) => one.shape === "bounds");
   if (bounds) return { min: bounds.a, max: bounds.b };
   const box = roomyBox(simulation);
+  includeGhost(box, simulation.ghost);
   includeSolids(box, simulation);
   return box;
+}
+
+/** Includes the particles of a ghost that are not far away. @param {Box} box @param {import("../net/wire.js").Ghost | null} ghost */
+function includeGhost(box, ghost) {
+  const far = GHOST_SIZES * length(subtract(box.max, box.min));
+  const middle = scale(add(box.min, box.max), 0.5);
+  const positions = ghost?.positions ?? [];
+  for (let at = 0; at < positions.length; at += 3) {
+    const position = /** @type {Vec3} */ ([positions[at], positions[at + 1], positions[at + 2]]);
+    if (length(subtract(position, middle)) < far) include(box, position);
+  }
 }
 
 /** The box of the particles that belong to the scene, with room around a single point. @param {import("./simulation.js").Simulation} simulation */

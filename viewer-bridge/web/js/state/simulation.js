@@ -92,7 +92,7 @@ export class Simulation extends Emitter {
     this.ghost = null;
     /** The next ghost: its frame follows. @type {import("../net/wire.js").Ghost | null} */
     this.nextGhost = null;
-    /** What is known of the other recording. @type {import("../net/messages.js").GhostMessage | null} */
+    /** The choice of the other recording, and how it compares. @type {import("../net/messages.js").GhostMessage | null} */
     this.ghostChoice = null;
     /** The past of a live simulation that the page can look back at. @type {HistoryMessage | null} */
     this.history = null;

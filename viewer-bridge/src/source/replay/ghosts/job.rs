@@ -10,15 +10,14 @@ use recorder::Tape;
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{ConstraintState, Stop};
 
-use super::super::open::{self, Recording};
+use super::super::open::{self, Recording, file_of};
 use super::comparison::{Compared, compare};
-use super::file_of;
 use crate::message::GhostState;
 
 /// Time between two reports.
 const REPORT_PERIOD_NS: u64 = SECOND_NS / 2;
 
-/// What the thread reports.
+/// A report of the thread.
 #[derive(Debug)]
 pub(super) enum Report {
     /// The ghost is open, and has the particles and constraints of the recording on show.
