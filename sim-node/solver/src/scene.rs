@@ -11,6 +11,7 @@ mod error;
 mod generate;
 mod mesh;
 pub(crate) mod model;
+mod poses;
 mod read;
 mod source;
 mod warnings;
@@ -37,5 +38,6 @@ pub use generate::web::Web;
 pub use generate::{Generator, Shape};
 pub use mesh::pins::check_pin_expression;
 pub use mesh::{Mesh, ParsedMesh};
+pub use poses::ScenePoses;
 
 pub use source::{LoadError, is_path};

@@ -2,6 +2,7 @@
 //! commands show in the snapshots of the node.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a panic is how a test fails")]
 
+mod carry;
 #[path = "../../../viewer-bridge/tests/sockets/foxglove_client.rs"]
 #[allow(dead_code, reason = "its other half is used by the tests that have no node")]
 mod foxglove_client;

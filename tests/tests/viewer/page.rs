@@ -152,7 +152,7 @@ impl Page {
 
     pub(crate) fn scene(&mut self) -> Scene {
         self.receive("a scene", |message| match message {
-            wire::Message::Scene(scene) => Some(scene),
+            wire::Message::Scene(scene) => Some(*scene),
             _ => None,
         })
     }

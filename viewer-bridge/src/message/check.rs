@@ -22,6 +22,11 @@ pub fn check(command: &Command) -> Result<(), Reason> {
             points(&[*target])?;
             within(*over_s, 0.0, GRAB_OVER_S_MAX)
         }
+        Command::Carry { offset, over_s, .. } => {
+            points(&[*offset])?;
+            within(*over_s, 0.0, GRAB_OVER_S_MAX)
+        }
+        Command::Throw { velocity, .. } => points(&[*velocity]),
         Command::Brush { eye, ray, radius, delta, over_s, cap } => {
             points(&[*eye, *ray, *delta])?;
             direction(ray)?;

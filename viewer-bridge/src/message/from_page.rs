@@ -7,6 +7,7 @@ use sim_contract::{GRAB_OVER_S_DEFAULT, KindFilter, ParameterValue};
 use thiserror::Error;
 
 use super::body_drive::{BodyDrive, no_rotation};
+use super::object::ObjectKind;
 use super::timeline::Toward;
 use crate::limits::PARTICLES_INSPECTED_MAX;
 
@@ -149,6 +150,18 @@ pub enum Command {
         #[serde(default = "no_rotation")]
         rotation: [f32; 4],
     },
+    Carry {
+        object: ObjectKind,
+        index: u32,
+        offset: [f32; 3],
+        #[serde(default = "over_s_default")]
+        over_s: f32,
+    },
+    Throw {
+        object: ObjectKind,
+        index: u32,
+        velocity: [f32; 3],
+    },
     Pause {},
     Resume {},
     Step {
@@ -229,6 +242,8 @@ impl Command {
             Self::MoveCollider { .. } => "move_collider",
             Self::DriveBody(_) => "drive_body",
             Self::MoveAnchor { .. } => "move_anchor",
+            Self::Carry { .. } => "carry",
+            Self::Throw { .. } => "throw",
             Self::Pause {} => "pause",
             Self::Resume {} => "resume",
             Self::Step { .. } => "step",

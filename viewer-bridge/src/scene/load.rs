@@ -69,6 +69,7 @@ impl Load {
                 up: summary.up.name().to_owned(),
                 run_id: format!("{:016x}", self.header.run_id),
                 shapes: summary.shapes.clone(),
+                anchors: summary.poses.anchored().collect(),
             },
             collider_meshes: summary.collider_meshes.clone(),
             ..Scene::default()

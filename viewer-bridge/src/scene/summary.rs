@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use sim_contract::ParameterValues;
 use sim_solver::Scene;
-use sim_solver::scene::{ColliderMeshes, Shape, Up};
+use sim_solver::scene::{ColliderMeshes, ScenePoses, Shape, Up};
 
 use crate::limits::SHAPES_MAX;
 use crate::wire::ShapeText;
@@ -28,6 +28,8 @@ pub struct SceneSummary {
     pub collider_meshes: ColliderMeshes,
     /// The generated shapes, at most [`SHAPES_MAX`].
     pub shapes: Vec<ShapeText>,
+    /// The colliders and anchors at load.
+    pub poses: ScenePoses,
 }
 
 impl SceneSummary {
@@ -39,6 +41,7 @@ impl SceneSummary {
             parameters: parameters(&scene),
             collider_meshes: scene.collider_meshes(),
             shapes: scene.shapes().take(SHAPES_MAX).map(shape_text).collect(),
+            poses: ScenePoses::new(&scene),
             name: scene.name,
             unit: scene.unit,
             up: scene.up,
@@ -60,6 +63,7 @@ impl Default for SceneSummary {
             parameters: ParameterValues::default(),
             collider_meshes: ColliderMeshes::new(),
             shapes: Vec::new(),
+            poses: ScenePoses::default(),
         }
     }
 }

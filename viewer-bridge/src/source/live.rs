@@ -2,6 +2,7 @@
 
 mod actions;
 mod brush;
+mod carrier;
 mod command_context;
 mod dispatch;
 mod link;

@@ -26,6 +26,11 @@ impl ShownState {
         &self.torn
     }
 
+    /// The colliders.
+    pub fn colliders(&self) -> &[ColliderState] {
+        &self.colliders
+    }
+
     /// Shows a new load. Nothing of it is torn, held or moved yet.
     pub fn begin_load(&mut self, sinks: &Sinks, mut scene: Scene) {
         *self = Self { epoch: self.epoch.wrapping_add(1), ..Self::default() };

@@ -16,7 +16,7 @@ use super::statistics::Statistics;
 #[derive(Debug, Clone, PartialEq)]
 pub enum Message {
     /// A load.
-    Scene(Scene),
+    Scene(Box<Scene>),
     /// The positions of a step.
     Frame(Frame),
     /// A change of the list of torn constraints.
@@ -53,7 +53,7 @@ pub fn decode(bytes: &[u8]) -> Result<Message, DecodeError> {
     }
     let is = |known: Kind| kind == known as u16;
     let message = if is(Kind::Scene) {
-        Message::Scene(Scene::decode(stamp, &mut cursor)?)
+        Message::Scene(Box::new(Scene::decode(stamp, &mut cursor)?))
     } else if is(Kind::FrameF32) {
         Message::Frame(frame::decode(Format::F32, stamp, &mut cursor)?)
     } else if is(Kind::FrameU16) {

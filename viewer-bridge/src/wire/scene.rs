@@ -59,6 +59,9 @@ pub struct SceneText {
     pub run_id: String,
     /// The generated shapes.
     pub shapes: Vec<ShapeText>,
+    /// The particles of each anchor.
+    #[serde(default)]
+    pub anchors: Vec<Vec<u32>>,
 }
 
 /// A generated shape of a scene, in its JSON.

@@ -42,6 +42,7 @@ fn scene() -> Scene {
         rate_hz: 240,
         origin: [0.0, 100.5, -2.0],
         text: SceneText {
+            anchors: vec![vec![0, 2], vec![1]],
             name: "gemütlich".to_owned(),
             unit: "m".to_owned(),
             up: "y".to_owned(),
@@ -325,7 +326,7 @@ fn the_bytes_of_every_message_are_frozen() {
 
 #[test]
 fn every_message_decodes_to_what_was_encoded() {
-    assert_eq!(decode(&scene().encode()), Ok(Message::Scene(scene())));
+    assert_eq!(decode(&scene().encode()), Ok(Message::Scene(Box::new(scene()))));
     assert_eq!(decode(&colliders().encode()), Ok(Message::Colliders(colliders())));
     assert_eq!(decode(&forces().encode()), Ok(Message::Forces(forces())));
     assert_eq!(decode(&inspected().encode()), Ok(Message::Inspected(inspected())));

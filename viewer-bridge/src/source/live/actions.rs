@@ -74,6 +74,8 @@ pub(super) fn actions(
         }
         // The server of the pages and the link answer them.
         Command::Look { .. }
+        | Command::Carry { .. }
+        | Command::Throw { .. }
         | Command::Undo { .. }
         | Command::Record {}
         | Command::StopRecording {} => return Err(Refusal::OnlyLive),

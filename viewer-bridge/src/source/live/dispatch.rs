@@ -103,6 +103,11 @@ impl Dispatch {
         }
     }
 
+    /// Sends actions for the bridge itself, without an answer to a client.
+    pub(super) fn add(&mut self, actions: Vec<Action>) {
+        self.outbox.extend(actions.into_iter().map(|action| Part { command: None, action }));
+    }
+
     fn open_command(&mut self, client: ClientId, outcome: OutcomeText, parts: Vec<Action>) {
         self.last_command += 1;
         let number = self.last_command;

@@ -9,6 +9,7 @@ use sim_contract::{
     Action, AttachError, Client, Endpoint, NodeStatus, Outcome, ParameterValues, SnapshotFlags, Tap,
 };
 
+use super::carrier::Carrier;
 use super::command_context::CommandContext;
 use super::dispatch::Dispatch;
 use super::newest_state::{LoadedState, NewestState};
@@ -19,7 +20,7 @@ use super::undo::stack::Change;
 use super::undo::{Undo, UndoRequest};
 use super::updates::Updates;
 use crate::limits::{FRAMES_PER_SECOND_MAX, RELEASE_TIMEOUT};
-use crate::message::{Command, Level, Node, ParametersText};
+use crate::message::{Command, Level, Node, OutcomeText, ParametersText, Refusal};
 use crate::request::{ClientId, Request, RequestKind, Requests};
 use crate::scene::catalog::Catalog;
 use crate::sink::{Demand, Sinks, State, Update};
@@ -72,6 +73,7 @@ pub(super) struct Link {
     /// The parameters that were published last.
     published_parameters: Option<ParametersText>,
     pub(super) dispatch: Dispatch,
+    pub(super) carrier: Carrier,
     catalog: Arc<Catalog>,
     /// It outlives the link: a load can begin another run.
     pub(super) undo: Undo,
@@ -94,6 +96,7 @@ impl Link {
             reads_forces: false,
             published_parameters: None,
             dispatch: Dispatch::new(Arc::clone(catalog)),
+            carrier: Carrier::default(),
             catalog: Arc::clone(catalog),
             undo: Undo::default(),
             keyframes: Keyframes::default(),
@@ -116,7 +119,9 @@ impl Link {
         self.dispatch.flush(&mut self.client, sinks);
         self.follow_forces(sinks);
         let is_due = sinks.has_demand(Demand::State) && monotonic_ns() >= self.next_frame_ns;
-        if is_due && self.is_fast() {
+        if self.carrier.is_moving() {
+            self.tap.wait(FRESH_STATE_WAIT);
+        } else if is_due && self.is_fast() {
             // A fast node always has a state that was not shown. The first wait clears the wake-ups
             // of the past, the second one waits for the next state.
             self.tap.wait(Duration::ZERO);
@@ -127,6 +132,7 @@ impl Link {
             self.tap.wait(FRESH_STATE_WAIT);
             self.read(shown, sinks)?;
         }
+        self.move_carried(sinks);
         self.show(shown, sinks);
         let now_ns = monotonic_ns();
         self.dispatch.expire(sinks, now_ns);
@@ -138,6 +144,16 @@ impl Link {
             return Err(LinkEnd::ShuttingDown);
         }
         self.check_owner(now_ns)
+    }
+
+    /// Sends what is carried to its place in the next step.
+    pub(super) fn move_carried(&mut self, sinks: &Sinks) {
+        let Some(state) = self.newest.get() else { return };
+        let moves = self.carrier.advance(&state);
+        if !moves.is_empty() {
+            self.dispatch.add(moves);
+            self.dispatch.flush(&mut self.client, sinks);
+        }
     }
 
     /// Reads the forces while a client wants them: a reader costs the node time.
@@ -182,7 +198,12 @@ impl Link {
         let is_awaited = sinks.has_demand(Demand::State);
         for _ in 0..REQUESTS_AT_ONCE_MAX {
             let until_due_ns = self.next_frame_ns.saturating_sub(monotonic_ns());
-            let timeout = if is_awaited { Duration::from_nanos(until_due_ns) } else { IDLE_PERIOD };
+            let timeout = match is_awaited {
+                // The next step is waited for instead.
+                _ if self.carrier.is_moving() => Duration::ZERO,
+                true => Duration::from_nanos(until_due_ns),
+                false => IDLE_PERIOD,
+            };
             let Some(request) = requests.next(timeout) else { return };
             let is_new_demand = matches!(request.kind, RequestKind::State | RequestKind::Credit);
             self.handle(request, shown, sinks);
@@ -200,6 +221,7 @@ impl Link {
             RequestKind::Credit => {}
             RequestKind::Left => {
                 self.dispatch.remove_client(client);
+                self.carrier.remove_client(client);
                 self.undo.remove_client(client);
             }
             RequestKind::Command { id, command: Command::Undo { takes_others } } => {
@@ -209,9 +231,46 @@ impl Link {
                     sinks.publish(&Update::Answer { client, outcome: &outcome });
                 }
             }
+            RequestKind::Command {
+                id,
+                command: command @ (Command::Carry { .. } | Command::Throw { .. }),
+            } => {
+                let outcome = match self.carry(client, &command, shown) {
+                    Ok(()) => {
+                        OutcomeText { applied: 1, ..OutcomeText::pending(id, command.name()) }
+                    }
+                    Err(reason) => OutcomeText::refused(id, command.name(), reason),
+                };
+                if id.is_some() || outcome.applied == 0 {
+                    sinks.publish(&Update::Answer { client, outcome: &outcome });
+                }
+            }
             RequestKind::Command { id, command } => {
                 self.submit((client, id), command, shown, sinks);
             }
+        }
+    }
+
+    /// Carries something for a client, or lets it go.
+    fn carry(
+        &mut self,
+        client: ClientId,
+        command: &Command,
+        shown: &ShownState,
+    ) -> Result<(), Refusal> {
+        if self.status.as_ref().is_some_and(NodeStatus::is_replay) {
+            return Err(Refusal::OnlyLive);
+        }
+        let state = self.newest.get().ok_or(Refusal::NoNode)?;
+        match *command {
+            Command::Carry { object, index, offset, over_s } => {
+                let place = (&state, shown.colliders());
+                self.carrier.carry(client, object.at(index), (offset, over_s), place)
+            }
+            Command::Throw { object, index, velocity } => {
+                self.carrier.throw(client, object.at(index), velocity)
+            }
+            _ => Ok(()),
         }
     }
 
@@ -252,7 +311,7 @@ impl Link {
         // A client that waits for an answer sees the effect of its command after the answer. The last
         // answers of a run arrive together with the first messages of the next one.
         handle_outcomes(
-            (&mut self.dispatch, &mut self.undo),
+            (&mut self.dispatch, &mut self.carrier, &mut self.undo),
             &mut self.client,
             self.newest.get(),
             &updates.outcomes,
@@ -352,7 +411,7 @@ impl Link {
             let mut updates = Updates::for_run(self.run_id);
             self.tap.latest_state(|update| updates.add(update));
             handle_outcomes(
-                (&mut self.dispatch, &mut self.undo),
+                (&mut self.dispatch, &mut self.carrier, &mut self.undo),
                 &mut self.client,
                 None,
                 &updates.outcomes,
@@ -400,7 +459,7 @@ fn note_change(dispatch: &Dispatch, undo: &mut Undo, outcome: &Outcome, is_own: 
 
 /// Publishes outcomes, and answers the clients whose commands they belong to.
 fn handle_outcomes(
-    (dispatch, undo): (&mut Dispatch, &mut Undo),
+    (dispatch, carrier, undo): (&mut Dispatch, &mut Carrier, &mut Undo),
     client: &mut Client,
     newest: Option<LoadedState<'_>>,
     outcomes: &[Outcome],
@@ -411,6 +470,9 @@ fn handle_outcomes(
         let action = outcome.command.action();
         if outcome.is_applied() {
             end_grabs(dispatch, &action);
+            if OutcomeRow::from(outcome).replaces_state() || matches!(action, Action::Load { .. }) {
+                carrier.clear();
+            }
             if OutcomeRow::from(outcome).replaces_state() {
                 sinks.publish(&Update::Reset { step: outcome.step });
             }

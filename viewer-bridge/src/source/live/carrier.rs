@@ -1,0 +1,401 @@
+//! Carries colliders and anchors for clients, and lets them glide on when they are thrown.
+//!
+//! The node moves a collider to a pose within one step, at the velocity that this implies. A page sends one
+//! target per frame, which takes several steps, so the bridge sends a pose for each of them.
+
+use std::collections::BTreeMap;
+
+use sim_contract::{Action, ColliderFields, ColliderShape, ColliderState, ParticleFlags, Reason};
+use sim_solver::Pose;
+
+use super::newest_state::LoadedState;
+use crate::message::{Object, Refusal};
+use crate::request::ClientId;
+use crate::wire::convert::to_f32;
+
+/// Time in which a thrown object loses all but 1/e of its velocity, in s.
+const GLIDE_S: f64 = 0.3;
+/// Time after which it is at rest: at 1/3000 of its velocity, in s.
+const GLIDE_END_S: f64 = 8.0 * GLIDE_S;
+/// Flags of a particle that its anchor does not drive.
+const HELD: u32 = ParticleFlags::PINNED | ParticleFlags::GRABBED | ParticleFlags::FROZEN;
+
+/// The objects that clients carry or have thrown.
+#[derive(Debug, Default)]
+pub(super) struct Carrier {
+    objects: BTreeMap<Object, Carried>,
+    /// Step of the last state, once there is one.
+    step: Option<u64>,
+}
+
+/// An object and its motion.
+#[derive(Debug, Clone, Copy)]
+struct Carried {
+    client: ClientId,
+    /// Pose at which the client began to carry it.
+    begin: Pose,
+    /// Offset from there in the last step that was sent.
+    offset: [f64; 3],
+    motion: Motion,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Motion {
+    /// It reaches the target with an equal part of the way in each step, and waits there.
+    Carried { target: [f64; 3], steps_left: f64 },
+    /// It slows down.
+    Thrown { velocity: [f64; 3], left_s: f64 },
+}
+
+impl Carrier {
+    /// Moves an object towards an offset from the pose at which the client began to carry it.
+    ///
+    /// # Errors
+    /// The scene has no such object, or another client carries it.
+    pub(super) fn carry(
+        &mut self,
+        client: ClientId,
+        object: Object,
+        (offset, over_s): ([f32; 3], f32),
+        (state, colliders): (&LoadedState<'_>, &[ColliderState]),
+    ) -> Result<(), Refusal> {
+        let rate_hz = f64::from(state.load.header.rate_hz.max(1));
+        let mut target = offset.map(f64::from);
+        if state.load.summary.is_planar {
+            target[2] = 0.0;
+        }
+        let motion = Motion::Carried { target, steps_left: (f64::from(over_s) * rate_hz).max(1.0) };
+        if let Some(carried) = self.objects.get_mut(&object)
+            && matches!(carried.motion, Motion::Carried { .. })
+        {
+            if carried.client != client {
+                return Err(Reason::GrabbedByOther.into());
+            }
+            carried.motion = motion;
+            return Ok(());
+        }
+        let begin = pose(object, state, colliders)?;
+        self.objects.insert(object, Carried { client, begin, offset: [0.0; 3], motion });
+        Ok(())
+    }
+
+    /// Ends the carrying of an object, which glides on with a velocity in m/s.
+    ///
+    /// # Errors
+    /// This client does not carry it.
+    pub(super) fn throw(
+        &mut self,
+        client: ClientId,
+        object: Object,
+        velocity: [f32; 3],
+    ) -> Result<(), Refusal> {
+        let carried = self
+            .objects
+            .get_mut(&object)
+            .filter(|one| one.client == client && matches!(one.motion, Motion::Carried { .. }));
+        let carried = carried.ok_or(Reason::NotGrabbed)?;
+        let velocity = velocity.map(f64::from);
+        carried.motion = Motion::Thrown { velocity, left_s: GLIDE_END_S };
+        if velocity == [0.0; 3] {
+            self.objects.remove(&object);
+        }
+        Ok(())
+    }
+
+    /// Puts down what a client carries.
+    pub(super) fn remove_client(&mut self, client: ClientId) {
+        self.objects.retain(|_, carried| carried.client != client);
+    }
+
+    /// Forgets all objects: another state is in place.
+    pub(super) fn clear(&mut self) {
+        self.objects.clear();
+    }
+
+    /// Returns whether the next steps need poses.
+    pub(super) fn is_moving(&self) -> bool {
+        self.objects.values().any(Carried::is_moving)
+    }
+
+    /// Returns the moves for the step after the newest state.
+    pub(super) fn advance(&mut self, state: &LoadedState<'_>) -> Vec<Action> {
+        let step = state.header.step;
+        let passed = self.step.map_or(1, |before| step.saturating_sub(before));
+        self.step = Some(step);
+        if passed == 0 {
+            return Vec::new();
+        }
+        let (steps, is_planar) = (passed as f64, state.load.summary.is_planar);
+        let dt = 1.0 / f64::from(state.load.header.rate_hz.max(1));
+        let mut moves = Vec::new();
+        for (object, carried) in self.objects.iter_mut().filter(|(_, one)| one.is_moving()) {
+            carried.advance(steps, dt);
+            moves.push(carried.action(*object, is_planar));
+        }
+        self.objects
+            .retain(|_, one| matches!(one.motion, Motion::Carried { .. }) || one.is_moving());
+        moves
+    }
+}
+
+impl Carried {
+    fn is_moving(&self) -> bool {
+        match self.motion {
+            Motion::Carried { steps_left, .. } => steps_left > 0.0,
+            Motion::Thrown { left_s, .. } => left_s > 0.0,
+        }
+    }
+
+    /// Moves it by a number of steps of `dt` seconds each.
+    fn advance(&mut self, steps: f64, dt: f64) {
+        match &mut self.motion {
+            Motion::Carried { target, steps_left } => {
+                let share = (steps / *steps_left).min(1.0);
+                for (offset, target) in self.offset.iter_mut().zip(target) {
+                    *offset += (*target - *offset) * share;
+                }
+                *steps_left -= steps;
+            }
+            Motion::Thrown { velocity, left_s } => {
+                let left = (-steps * dt / GLIDE_S).exp();
+                for (offset, velocity) in self.offset.iter_mut().zip(velocity) {
+                    *offset += *velocity * GLIDE_S * (1.0 - left);
+                    *velocity *= left;
+                }
+                *left_s -= steps * dt;
+            }
+        }
+    }
+
+    fn action(&self, object: Object, is_planar: bool) -> Action {
+        let Pose { translation, mut rotation } = self.begin;
+        let mut translation: [f32; 3] =
+            std::array::from_fn(|axis| to_f32(f64::from(translation[axis]) + self.offset[axis]));
+        if is_planar {
+            // A pose must not leave the plane, not even by a rounding error.
+            (translation[2], rotation[0], rotation[1]) = (0.0, 0.0, 0.0);
+        }
+        match object {
+            Object::Collider(collider) => Action::MoveCollider { collider, translation, rotation },
+            Object::Anchor(anchor) => Action::MoveAnchor { anchor, translation, rotation },
+        }
+    }
+}
+
+/// Returns the present pose of an object, relative to that at load.
+fn pose(
+    object: Object,
+    state: &LoadedState<'_>,
+    colliders: &[ColliderState],
+) -> Result<Pose, Refusal> {
+    let poses = &state.load.summary.poses;
+    match object {
+        Object::Collider(index) => {
+            let fields = colliders.get(index as usize).and_then(fields);
+            let pose = fields.and_then(|fields| poses.collider(index, &fields));
+            pose.ok_or(Reason::UnknownCollider.into())
+        }
+        Object::Anchor(index) => {
+            let position = |particle: u32| {
+                let particle = state.particles.get(particle as usize)?;
+                (particle.flags & HELD == 0).then_some(particle.position)
+            };
+            poses.anchor(index, position).ok_or(Reason::UnknownAnchor.into())
+        }
+    }
+}
+
+/// Reads shape and pose. `None` for a shape that this version does not know.
+fn fields(collider: &ColliderState) -> Option<ColliderFields> {
+    let &ColliderState { radius, offset, normal, center, half_extents, rotation, a, b, .. } =
+        collider;
+    let shape = ColliderShape::from_number(collider.shape)?;
+    Some(ColliderFields { shape, radius, offset, normal, center, half_extents, rotation, a, b })
+}
+
+#[cfg(test)]
+mod tests {
+    use sim_contract::{LoadHeader, ParticleState, SnapshotHeader};
+    use sim_solver::{Scene, Solver};
+
+    use super::*;
+    use crate::scene::load::Load;
+    use crate::scene::summary::SceneSummary;
+
+    const SCENE: &str = "
+        version = 1
+        [[particle]]
+        position = [0, 1, 0]
+        [[anchor]]
+        particles = [0]
+        [[collider]]
+        shape = 'sphere'
+        center = [1, 0, 0]
+        radius = 0.5
+        velocity = [0, 2, 0]";
+    const BALL: Object = Object::Collider(0);
+    const RATE_HZ: u32 = 100;
+    const ADA: ClientId = ClientId::Page(1);
+    const BEN: ClientId = ClientId::Page(2);
+
+    /// A scene whose ball has moved by its own velocity up to a step.
+    struct Stage {
+        load: Load,
+        header: SnapshotHeader,
+        particles: Vec<ParticleState>,
+        colliders: Vec<ColliderState>,
+    }
+
+    impl Stage {
+        fn new(text: &str, steps: u32) -> Self {
+            let scene = Scene::from_toml(text, "").unwrap();
+            let mut solver = Solver::new(&scene);
+            for _ in 0..steps {
+                solver.step();
+            }
+            let position = solver.particle(0).position;
+            Self {
+                load: Load {
+                    header: LoadHeader { rate_hz: RATE_HZ, ..LoadHeader::default() },
+                    summary: SceneSummary::from_toml(text).unwrap(),
+                    constraints: Vec::new(),
+                    triangles: Vec::new(),
+                },
+                header: SnapshotHeader { step: u64::from(steps), ..SnapshotHeader::default() },
+                particles: vec![ParticleState { position, ..ParticleState::default() }],
+                colliders: solver.colliders().map(|one| one.shape.fields().into()).collect(),
+            }
+        }
+
+        fn state(&self) -> LoadedState<'_> {
+            LoadedState {
+                load: &self.load,
+                header: &self.header,
+                particles: &self.particles,
+                forces: None,
+            }
+        }
+
+        fn carry(
+            &self,
+            carrier: &mut Carrier,
+            client: ClientId,
+            offset: [f32; 3],
+            over_s: f32,
+        ) -> Result<(), Refusal> {
+            carrier.carry(client, BALL, (offset, over_s), (&self.state(), &self.colliders))
+        }
+
+        /// Makes the steps that follow, one by one, and returns the translation of each move.
+        fn moves(&mut self, carrier: &mut Carrier, steps: u32) -> Vec<[f32; 3]> {
+            let translation = |action: &Action| match *action {
+                Action::MoveCollider { translation, .. }
+                | Action::MoveAnchor { translation, .. } => translation,
+                _ => panic!("{action:?}"),
+            };
+            let mut moves = Vec::new();
+            for _ in 0..steps {
+                self.header.step += 1;
+                moves.extend(carrier.advance(&self.state()).iter().map(translation));
+            }
+            moves
+        }
+    }
+
+    fn near(a: [f32; 3], b: [f32; 3]) -> bool {
+        a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-5)
+    }
+
+    #[test]
+    fn a_carried_object_covers_the_way_in_equal_parts_from_where_it_is() {
+        // The rate of the scene is 240 Hz, so the ball has risen by 1 m.
+        let mut stage = Stage::new(SCENE, 120);
+        let mut carrier = Carrier::default();
+        carrier.advance(&stage.state());
+        stage.carry(&mut carrier, ADA, [0.4, 0.0, 0.0], 0.04).unwrap();
+        let moves = stage.moves(&mut carrier, 6);
+        let expected = [0.1, 0.2, 0.3, 0.4].map(|x| [x, 1.0, 0.0]);
+        assert_eq!(moves.len(), 4, "{moves:?}");
+        assert!(moves.iter().zip(expected).all(|(a, b)| near(*a, b)), "{moves:?}");
+        assert!(!carrier.is_moving());
+        // The next target is relative to the same beginning, and reached even if steps are missed.
+        stage.carry(&mut carrier, ADA, [0.4, -0.4, 0.0], 0.04).unwrap();
+        stage.header.step += 2;
+        assert!(near(stage.moves(&mut carrier, 1)[0], [0.4, 0.7, 0.0]));
+        assert!(near(stage.moves(&mut carrier, 1)[0], [0.4, 0.6, 0.0]));
+        // Without time it is there in the next step.
+        stage.carry(&mut carrier, ADA, [0.0, 0.0, 0.0], 0.0).unwrap();
+        assert!(near(stage.moves(&mut carrier, 3)[0], [0.0, 1.0, 0.0]));
+        // The same state again is no step.
+        assert!(carrier.advance(&stage.state()).is_empty());
+    }
+
+    #[test]
+    fn a_thrown_object_slows_down_to_rest() {
+        let mut stage = Stage::new(SCENE, 0);
+        let mut carrier = Carrier::default();
+        carrier.advance(&stage.state());
+        stage.carry(&mut carrier, ADA, [0.0; 3], 0.0).unwrap();
+        stage.moves(&mut carrier, 1);
+        carrier.throw(ADA, BALL, [2.0, 0.0, -1.0]).unwrap();
+        let moves = stage.moves(&mut carrier, 1000);
+        let first = moves[0];
+        assert!((first[0] - 0.02).abs() < 5e-4 && (first[2] + 0.01).abs() < 5e-4, "{first:?}");
+        let ways: Vec<_> = moves.windows(2).map(|pair| pair[1][0] - pair[0][0]).collect();
+        assert!(ways.windows(2).all(|pair| pair[1] <= pair[0] + 1e-6), "{ways:?}");
+        let last = moves.last().unwrap();
+        let whole = to_f32(GLIDE_S);
+        assert!((last[0] - 2.0 * whole).abs() < 1e-3 && (last[2] + whole).abs() < 1e-3, "{last:?}");
+        assert!(moves.len() < 300 && !carrier.is_moving());
+        // It can be taken again, from where it is.
+        assert!(carrier.objects.is_empty());
+    }
+
+    #[test]
+    fn only_one_client_carries_an_object() {
+        let mut stage = Stage::new(SCENE, 0);
+        let mut carrier = Carrier::default();
+        let taken = Err(Refusal::Node(Reason::GrabbedByOther));
+        let not_held = Err(Refusal::Node(Reason::NotGrabbed));
+        assert_eq!(carrier.throw(ADA, BALL, [0.0; 3]), not_held);
+        stage.carry(&mut carrier, ADA, [1.0; 3], 0.1).unwrap();
+        assert_eq!(stage.carry(&mut carrier, BEN, [1.0; 3], 0.1), taken);
+        assert_eq!(carrier.throw(BEN, BALL, [0.0; 3]), not_held);
+        // A thrown object belongs to nobody.
+        carrier.throw(ADA, BALL, [1.0; 3]).unwrap();
+        stage.carry(&mut carrier, BEN, [1.0; 3], 0.1).unwrap();
+        assert_eq!(carrier.throw(ADA, BALL, [0.0; 3]), not_held);
+        carrier.remove_client(BEN);
+        assert!(!carrier.is_moving());
+        assert_eq!(stage.moves(&mut carrier, 3), Vec::<[f32; 3]>::new());
+    }
+
+    #[test]
+    fn an_anchor_is_carried_from_the_place_of_its_particles() {
+        let mut stage = Stage::new(SCENE, 0);
+        stage.particles[0].position = [0.0, 3.0, 0.5];
+        let mut carrier = Carrier::default();
+        let (anchor, place) = (Object::Anchor(0), (&stage.state(), &*stage.colliders));
+        carrier.carry(ADA, anchor, ([0.25, 0.0, 0.0], 0.0), place).unwrap();
+        let unknown = Err(Refusal::Node(Reason::UnknownAnchor));
+        assert_eq!(carrier.carry(ADA, Object::Anchor(1), ([0.0; 3], 0.0), place), unknown);
+        // What a client grabs is not where its anchor is.
+        let mut grabbed = Stage::new(SCENE, 0);
+        grabbed.particles[0].flags = ParticleFlags::GRABBED;
+        let place = (&grabbed.state(), &*grabbed.colliders);
+        assert_eq!(Carrier::default().carry(BEN, anchor, ([0.0; 3], 0.0), place), unknown);
+        let missing = Err(Refusal::Node(Reason::UnknownCollider));
+        assert_eq!(carrier.carry(ADA, Object::Collider(1), ([0.0; 3], 0.0), place), missing);
+        assert!(near(stage.moves(&mut carrier, 1)[0], [0.25, 2.0, 0.5]));
+    }
+
+    #[test]
+    fn a_planar_scene_stays_in_its_plane() {
+        let mut stage = Stage::new(&SCENE.replace("version = 1", "version = 1\ndimensions = 2"), 0);
+        let mut carrier = Carrier::default();
+        stage.carry(&mut carrier, ADA, [1.0, 0.0, 5.0], 0.0).unwrap();
+        assert_eq!(stage.moves(&mut carrier, 1), [[1.0, 0.0, 0.0]]);
+        carrier.throw(ADA, BALL, [1.0, 0.0, 5.0]).unwrap();
+        assert!(stage.moves(&mut carrier, 9).iter().all(|at| at[2] == 0.0));
+    }
+}
