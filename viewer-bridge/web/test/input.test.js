@@ -2,19 +2,9 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { Camera } from "../js/geometry/camera.js";
-import { Commands } from "../js/net/commands.js";
-import { Simulation } from "../js/state/simulation.js";
-import { Selection } from "../js/state/selection.js";
-import { Input } from "../js/tools/input.js";
+import { pageOf, sceneOf } from "./tools/page.js";
 
-const VIEWPORT = { width: 800, height: 600 };
-const SCENE = {
-  kind: "scene", epoch: 1, step: 0, particleCount: 1, constraintCount: 0, triangleCount: 0, isPlanar: false,
-  min: [0, 0, 0], max: [0, 0, 0], rateHz: 60, origin: [0, 0, 0], positions: new Float32Array(3), ends: new Uint32Array(0),
-  restLengths: new Float32Array(0), triangles: new Uint32Array(0), constraintKinds: new Uint8Array(0), name: "", unit: "m", up: "y", runId: "",
-};
-const FRAME = { kind: "frame", epoch: 1, step: 1, particleCount: 1, lo: [0, 0, 0], scale: [1, 1, 1], number: 1, positions: new Float32Array(3), nonFinite: new Uint32Array(0) };
+const SCENE = sceneOf([0, 0, 0]);
 
 /** A page that shows one particle, and presses it with the left button. Returns the page and what it sends. */
 function pressed() {
@@ -25,26 +15,7 @@ function pressed() {
 }
 
 /** A page that shows one particle, and an event of the mouse on it. */
-function shown(canChange = true) {
-  /** @type {Map<string, (event: object) => void>} */
-  const listeners = new Map();
-  const canvas = {
-    addEventListener: (type, listener) => listeners.set(type, listener),
-    getBoundingClientRect: () => ({ left: 0, top: 0 }),
-    setPointerCapture() {},
-    dataset: {},
-  };
-  const sent = [];
-  const commands = new Commands((message) => sent.push(message) > 0, () => {});
-  const simulation = new Simulation();
-  const app = { simulation, camera: new Camera(), renderer: { viewport: VIEWPORT, isDirty: false }, commands, selection: new Selection(simulation) };
-  const input = new Input(canvas, app, () => canChange);
-  simulation.receive(SCENE);
-  simulation.receive(FRAME);
-  const { x, y } = app.camera.project([0, 0, 0], VIEWPORT);
-  const event = { pointerId: 1, pointerType: "mouse", button: 0, clientX: x, clientY: y };
-  return { input, simulation, sent, listeners, event, selection: app.selection };
-}
+const shown = (canChange = true) => pageOf(SCENE, canChange);
 
 test("a reset or another scene ends a grab with a release, and without its last motion", () => {
   for (const change of [(page) => page.receiveText({ type: "reset", step: 2 }), (page) => page.receive({ ...SCENE, epoch: 2 })]) {

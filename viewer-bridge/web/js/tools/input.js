@@ -2,8 +2,11 @@
 
 import { clamp } from "../geometry/math.js";
 import { BrushTool } from "./brush.js";
+import { CarryTool } from "./carry.js";
 import { CutTool } from "./cut.js";
-import { CLICK_PIXELS, GrabTool } from "./grab.js";
+import { CLICK_PIXELS, DragTool } from "./drag.js";
+import { GrabTool } from "./grab.js";
+import { anchorOf, solidAt } from "./objects.js";
 import { togglePin } from "./pin.js";
 import { itemAt } from "./select.js";
 import { REACH, depthUnder, particleAt } from "./tool.js";
@@ -22,8 +25,10 @@ const LONG_PRESS_MS = 550;
 const SLACK = 6;
 /** Exponent of the zoom factor per unit of the wheel; a notch is 100 units. */
 const ZOOM_PER_UNIT = 0.0012;
-/** Limit on particles for hovering, which picks the nearest particle once per frame. */
+/** Limit on particles for hovering, which picks what is under the mouse once per frame. */
 const HOVER_PARTICLES_MAX = 20_000;
+/** The same for the triangles of a solid. */
+const HOVER_TRIANGLES_MAX = 20_000;
 
 export class Input {
   /** @param {HTMLCanvasElement} canvas @param {import("./tool.js").App} app @param {() => boolean} canChange returns true if commands may change the simulation */
@@ -87,9 +92,9 @@ export class Input {
     }
     this.tool = this.begin(event, at);
     const isView = this.tool instanceof ViewTool;
-    this.click = event.button === 0 && (isView || this.tool instanceof GrabTool) && (this.mode === "grab" || !this.canChange()) ? at : null;
+    this.click = event.button === 0 && (isView || this.tool instanceof DragTool) && (this.mode === "grab" || !this.canChange()) ? at : null;
     if (!isView) this.onTouch();
-    if (event.pointerType === "touch" && this.tool instanceof GrabTool) this.waitForLongPress(this.tool);
+    if (event.pointerType === "touch" && this.tool instanceof DragTool) this.waitForLongPress(this.tool);
     this.app.renderer.isDirty = true;
   }
 
@@ -103,18 +108,20 @@ export class Input {
     if (event.button === 2 || this.mode === "cut") return new CutTool(app, at);
     if (this.mode === "brush") return depthUnder(app, at, this.brushRadius) === null ? new ViewTool(app, at, "orbit") : new BrushTool(app, at, this.brushRadius);
     const particle = particleAt(app, at, reach);
+    if (this.mode === "grab") return dragAt(app, at, particle) ?? new ViewTool(app, at, "orbit");
     if (particle === null) return new ViewTool(app, at, "orbit");
-    if (this.mode === "grab") return new GrabTool(app, particle, at);
     togglePin(app, particle);
     return null;
   }
 
-  /** @param {GrabTool} grab */
-  waitForLongPress(grab) {
+  /** @param {DragTool & Tool} drag */
+  waitForLongPress(drag) {
+    const { particle } = drag;
+    if (particle === null) return;
     this.longPress = setTimeout(() => {
-      if (this.tool !== grab || distance(grab.start, grab.pointer) > SLACK) return;
+      if (this.tool !== drag || distance(drag.start, drag.pointer) > SLACK) return;
       this.finish();
-      togglePin(this.app, grab.particle);
+      togglePin(this.app, particle);
       navigator.vibrate?.(15);
     }, LONG_PRESS_MS);
   }
@@ -147,7 +154,7 @@ export class Input {
   release(event) {
     if (!this.pointers.delete(event.pointerId)) return;
     clearTimeout(this.longPress);
-    const isHeld = this.tool instanceof GrabTool && this.tool.isBegun;
+    const isHeld = this.tool instanceof DragTool && this.tool.isBegun;
     const click = event.type === "pointerup" && !isHeld ? this.click : null;
     this.click = null;
     this.finish();
@@ -166,7 +173,7 @@ export class Input {
 
   /** The particle that this page grabs, or null. */
   get grabbed() {
-    return this.tool instanceof GrabTool && this.tool.isBegun ? this.tool.particle : null;
+    return this.tool instanceof GrabTool && this.tool.isBegun ? this.tool.grabbed : null;
   }
 
   /** The node has refused the grab: another client has the particle. */
@@ -174,7 +181,7 @@ export class Input {
     return this.tool instanceof GrabTool && this.tool.isRefused;
   }
 
-  /** Ends the tool in use; a grab releases its particle. */
+  /** Ends the tool in use; a grab releases its particle, and what is carried is let go. */
   finish() {
     this.tool?.end();
     this.tool = null;
@@ -205,9 +212,9 @@ export class Input {
     return particle !== null;
   }
 
-  /** Toggles the pin of the grabbed particle, or of the one under the mouse. Returns false if there is none. */
+  /** Toggles the pin of the particle that is dragged, or of the one under the mouse. Returns false if there is none. */
   pinHovered() {
-    if (this.tool instanceof GrabTool) {
+    if (this.tool instanceof DragTool && this.tool.particle !== null) {
       togglePin(this.app, this.tool.particle);
       return true;
     }
@@ -238,9 +245,24 @@ export class Input {
     this.isHoverStale = false;
     const isQuick = (this.app.simulation.scene?.particleCount ?? 0) <= HOVER_PARTICLES_MAX;
     const canPick = this.hover !== null && isQuick && this.canChange() && (this.mode === "grab" || this.mode === "pin");
-    this.hovered = canPick && this.hover !== null ? particleAt(this.app, this.hover, REACH.mouse) : null;
-    this.canvas.dataset.cursor = this.mode === "cut" ? "cut" : this.hovered === null ? this.mode : "over";
+    const at = canPick ? this.hover : null;
+    this.hovered = at === null ? null : particleAt(this.app, at, REACH.mouse);
+    const isOver = this.hovered !== null || (at !== null && this.mode === "grab" && solidAt(this.app, at, HOVER_TRIANGLES_MAX) !== null);
+    this.canvas.dataset.cursor = this.mode === "cut" ? "cut" : isOver ? "over" : this.mode;
   }
+}
+
+/** The tool that moves what is pressed: an anchor by its particle, a particle, or else a solid. Null on nothing of these.
+ * @param {import("./tool.js").App} app @param {Pixel} at @param {number | null} particle @returns {CarryTool | GrabTool | null} */
+function dragAt(app, at, particle) {
+  if (particle === null) {
+    const solid = solidAt(app, at);
+    return solid === null ? null : new CarryTool(app, at, { object: "collider", particle, ...solid });
+  }
+  const anchor = anchorOf(app.simulation, particle);
+  const point = app.simulation.position(particle);
+  if (anchor === null || point === null) return new GrabTool(app, particle, at);
+  return new CarryTool(app, at, { object: "anchor", index: anchor, point, particle });
 }
 
 /** @param {Pixel} a @param {Pixel} b */

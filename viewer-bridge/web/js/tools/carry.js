@@ -1,0 +1,47 @@
+// Carrying: moves a collider or an anchor along with the pointer, and lets it go with the velocity of the pointer.
+
+import { subtract } from "../geometry/math.js";
+import { DragTool } from "./drag.js";
+import { OVER_S } from "./tool.js";
+
+/** @typedef {import("../geometry/math.js").Vec3} Vec3 */
+/** @typedef {import("../geometry/pick.js").Pixel} Pixel */
+/** @typedef {import("./tool.js").App} App */
+/** @typedef {import("./tool.js").Tool} Tool */
+/** A collider or an anchor, the point of it that was pressed, and the particle there.
+ * @typedef {{ object: "collider" | "anchor", index: number, point: Vec3, particle: number | null }} Load */
+
+/** @implements {Tool} */
+export class CarryTool extends DragTool {
+  /** @param {App} app @param {Pixel} start @param {Load} load */
+  constructor(app, start, { object, index, point, particle }) {
+    super(app, start, point, particle);
+    this.carried = { object, index };
+    /** The object is carried by the point under the pointer, so that it does not jump when the carrying begins. */
+    this.from = this.targetAt(start);
+  }
+
+  take() {
+    this.app.commands.run("carry", { ...this.carried, offset: [0, 0, 0], over_s: OVER_S.min }, ({ status }) => { this.isRefused = status === "rejected"; });
+  }
+
+  /** @param {Vec3} target @param {number} over_s */
+  send(target, over_s) {
+    // It would be refused again in every frame, or begin at a distance once the other client lets go.
+    if (!this.isRefused) this.app.commands.stream("carry", { ...this.carried, offset: subtract(target, this.from), over_s });
+  }
+
+  end() {
+    this.release(this.velocity(performance.now()));
+  }
+
+  /** Puts the object down where it is. */
+  cancel() {
+    this.release([0, 0, 0]);
+  }
+
+  /** @param {Vec3} velocity */
+  release(velocity) {
+    if (this.isBegun && !this.isRefused) this.app.commands.run("throw", { ...this.carried, velocity });
+  }
+}
