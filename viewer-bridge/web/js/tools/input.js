@@ -1,6 +1,6 @@
 // Pointer and wheel input on the picture: a press starts a tool, two fingers move the view.
 
-import { clamp } from "../geometry/math.js";
+import { clamp, length, subtract } from "../geometry/math.js";
 import { BrushTool } from "./brush.js";
 import { CarryTool } from "./carry.js";
 import { CutTool } from "./cut.js";
@@ -29,6 +29,8 @@ const ZOOM_PER_UNIT = 0.0012;
 const HOVER_PARTICLES_MAX = 20_000;
 /** The same for the triangles of a solid. */
 const HOVER_TRIANGLES_MAX = 20_000;
+/** Distance from which a particle is behind a solid, relative to the distance of that from the eye. */
+const BEHIND = 0.05;
 
 export class Input {
   /** @param {HTMLCanvasElement} canvas @param {import("./tool.js").App} app @param {() => boolean} canChange returns true if commands may change the simulation */
@@ -252,17 +254,25 @@ export class Input {
   }
 }
 
-/** The tool that moves what is pressed: an anchor by its particle, a particle, or else a solid. Null on nothing of these.
+/** The tool that moves what is pressed: an anchor by its particle, a particle, or a solid that hides it or is alone. Null on nothing of these.
  * @param {import("./tool.js").App} app @param {Pixel} at @param {number | null} particle @returns {CarryTool | GrabTool | null} */
 function dragAt(app, at, particle) {
-  if (particle === null) {
-    const solid = solidAt(app, at);
-    return solid === null ? null : new CarryTool(app, at, { object: "collider", particle, ...solid });
+  const point = particle === null ? null : app.simulation.position(particle);
+  const solid = solidAt(app, at);
+  if (particle === null || (solid !== null && point !== null && isBehind(app.camera, point, solid.point))) {
+    return solid === null ? null : new CarryTool(app, at, { object: "collider", particle: null, ...solid });
   }
   const anchor = anchorOf(app.simulation, particle);
-  const point = app.simulation.position(particle);
   if (anchor === null || point === null) return new GrabTool(app, particle, at);
   return new CarryTool(app, at, { object: "anchor", index: anchor, point, particle });
+}
+
+/** True if a particle is hidden by the solid at a point, and does not just lie beside its edge.
+ * @param {import("../geometry/camera.js").Camera} camera @param {import("../geometry/math.js").Vec3} particle @param {import("../geometry/math.js").Vec3} point */
+function isBehind(camera, particle, point) {
+  if (camera.isFlat) return false;
+  const eye = camera.eye();
+  return length(subtract(particle, eye)) > length(subtract(point, eye)) * (1 + BEHIND);
 }
 
 /** @param {Pixel} a @param {Pixel} b */

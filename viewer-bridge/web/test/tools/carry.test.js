@@ -205,9 +205,8 @@ test("a drag on an anchored particle carries its anchor, without a jump", () => 
   assert.equal(types(page).pop(), "throw");
 });
 
-test("a pinned particle, one without a known anchor, and one near a solid are grabbed", () => {
-  const near = shown([SPHERE], { positions: [0, 0, 0] });
-  for (const page of [anchored(PIN.anchored | PIN.pinned), anchored(PIN.anchored, []), anchored(PIN.frozen), near]) {
+test("a pinned particle, and one without a known anchor, are grabbed", () => {
+  for (const page of [anchored(PIN.anchored | PIN.pinned), anchored(PIN.anchored, []), anchored(PIN.frozen)]) {
     at(page, "pointerdown");
     at(page, "pointermove", 40);
     assert.deepEqual(types(page), ["grab"]);
@@ -250,4 +249,16 @@ test("the cursor shows a solid that can be carried, unless its mesh is large", (
   assert.equal(cursor(mesh(1)), "over");
   assert.equal(cursor(mesh(10_001)), "grab");
   assert.ok(isCarried(mesh(10_001)));
+});
+
+test("a solid in front of a particle is carried, and a particle in front of a solid is grabbed", () => {
+  const eye = (page) => page.camera.eye();
+  for (const [share, isSolid] of [[-1.2, true], [0.9, false]]) {
+    // On the line of sight through the middle of the sphere: behind it, or just in front.
+    const toEye = scale(eye(shown([])), 0.4 * share / length(eye(shown([]))));
+    const page = shown([SPHERE], { positions: isSolid ? toEye : scale(toEye, 1.2) });
+    at(page, "pointerdown");
+    assert.equal(page.input.tool.carried !== undefined, isSolid, `at ${share} radii`);
+    assert.equal(page.input.tool.grabbed !== undefined, !isSolid);
+  }
 });
