@@ -9,6 +9,7 @@
 )]
 
 mod access;
+mod carry;
 mod colours;
 mod effects;
 mod first_minute;

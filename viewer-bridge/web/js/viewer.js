@@ -37,6 +37,7 @@ export function createViewer({ app, colorLegend, charts, connector, banner, inpu
     /** Particles that are pinned, grabbed, anchored or frozen, with their flags. */
     get pins() { return [...simulation.pins]; },
     get grabbed() { return input.grabbed; },
+    get colliders() { return simulation.colliders.map(({ shape, center }) => ({ shape, center: [...center] })); },
     /** The selected items, with what is known of each. */
     get selected() { return app.selection.items.map((item) => ({ ...inspectItem(simulation, item), ...item })); },
     get pointerMode() { return input.mode; },

@@ -27,7 +27,7 @@ export class CarryTool extends DragTool {
 
   /** @param {Vec3} target @param {number} over_s */
   send(target, over_s) {
-    // It would be refused again in every frame, or begin at a distance once the other client lets go.
+    // It would be refused again in every frame, or begin at a distance once the other client releases it.
     if (!this.isRefused) this.app.commands.stream("carry", { ...this.carried, offset: subtract(target, this.from), over_s });
   }
 

@@ -183,7 +183,7 @@ export class Input {
     return this.tool instanceof GrabTool && this.tool.isRefused;
   }
 
-  /** Ends the tool in use; a grab releases its particle, and what is carried is let go. */
+  /** Ends the tool in use; a grab releases its particle, and an object is put down or thrown. */
   finish() {
     this.tool?.end();
     this.tool = null;
