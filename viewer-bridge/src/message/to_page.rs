@@ -251,6 +251,11 @@ impl OutcomeText {
         }
     }
 
+    /// The answer to a command that the bridge itself has applied.
+    pub(crate) fn applied(id: Option<u32>, kind: &'static str) -> Self {
+        Self { applied: 1, ..Self::pending(id, kind) }
+    }
+
     /// The answer to a command that was refused before it reached a node.
     pub fn refused(id: Option<u32>, kind: &'static str, reason: Refusal) -> Self {
         let mut outcome = Self { status: Status::Rejected, ..Self::pending(id, kind) };

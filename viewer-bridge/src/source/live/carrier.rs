@@ -24,8 +24,6 @@ const HELD: u32 = ParticleFlags::PINNED | ParticleFlags::GRABBED | ParticleFlags
 #[derive(Debug, Default)]
 pub(super) struct Carrier {
     objects: BTreeMap<Object, Carried>,
-    /// Step of the last state, once there is one.
-    step: Option<u64>,
 }
 
 /// An object and its motion.
@@ -37,6 +35,18 @@ struct Carried {
     /// Offset from there in the last step that was sent.
     offset: [f64; 3],
     motion: Motion,
+    moved: Moved,
+}
+
+/// The last move of a motion.
+#[derive(Debug, Clone, Copy)]
+enum Moved {
+    /// There is none yet.
+    Never,
+    /// It followed the command at once, when the newest state may have been old.
+    AtOnce { known_step: u64 },
+    /// It followed the state of a step.
+    After { step: u64 },
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -71,11 +81,14 @@ impl Carrier {
             if carried.client != client {
                 return Err(Reason::GrabbedByOther.into());
             }
-            carried.motion = motion;
+            carried.begin(motion);
             return Ok(());
         }
         let begin = pose(object, state, colliders)?;
-        self.objects.insert(object, Carried { client, begin, offset: [0.0; 3], motion });
+        self.objects.insert(
+            object,
+            Carried { client, begin, offset: [0.0; 3], motion, moved: Moved::Never },
+        );
         Ok(())
     }
 
@@ -95,7 +108,7 @@ impl Carrier {
             .filter(|one| one.client == client && matches!(one.motion, Motion::Carried { .. }));
         let carried = carried.ok_or(Reason::NotGrabbed)?;
         let velocity = velocity.map(f64::from);
-        carried.motion = Motion::Thrown { velocity, left_s: GLIDE_END_S };
+        carried.begin(Motion::Thrown { velocity, left_s: GLIDE_END_S });
         if velocity == [0.0; 3] {
             self.objects.remove(&object);
         }
@@ -120,17 +133,15 @@ impl Carrier {
     /// Returns the moves for the step after the newest state.
     pub(super) fn advance(&mut self, state: &LoadedState<'_>) -> Vec<Action> {
         let step = state.header.step;
-        let passed = self.step.map_or(1, |before| step.saturating_sub(before));
-        self.step = Some(step);
-        if passed == 0 {
-            return Vec::new();
-        }
-        let (steps, is_planar) = (passed as f64, state.load.summary.is_planar);
+        let is_planar = state.load.summary.is_planar;
         let dt = 1.0 / f64::from(state.load.header.rate_hz.max(1));
         let mut moves = Vec::new();
         for (object, carried) in self.objects.iter_mut().filter(|(_, one)| one.is_moving()) {
-            carried.advance(steps, dt);
-            moves.push(carried.action(*object, is_planar));
+            let passed = carried.pass(step);
+            if passed > 0 {
+                carried.advance(passed as f64, dt);
+                moves.push(carried.action(*object, is_planar));
+            }
         }
         self.objects
             .retain(|_, one| matches!(one.motion, Motion::Carried { .. }) || one.is_moving());
@@ -144,6 +155,26 @@ impl Carried {
             Motion::Carried { steps_left, .. } => steps_left > 0.0,
             Motion::Thrown { left_s, .. } => left_s > 0.0,
         }
+    }
+
+    /// Begins another motion, which goes on without a pause if it moves already.
+    fn begin(&mut self, motion: Motion) {
+        if !self.is_moving() {
+            self.moved = Moved::Never;
+        }
+        self.motion = motion;
+    }
+
+    /// Returns the number of steps since the last move, up to the step after the newest state.
+    fn pass(&mut self, step: u64) -> u64 {
+        let (passed, moved) = match self.moved {
+            Moved::Never => (1, Moved::AtOnce { known_step: step }),
+            Moved::AtOnce { known_step } if step > known_step => (1, Moved::After { step }),
+            Moved::AtOnce { .. } => (0, self.moved),
+            Moved::After { step: before } => (step.saturating_sub(before), Moved::After { step }),
+        };
+        self.moved = moved;
+        passed
     }
 
     /// Moves it by a number of steps of `dt` seconds each.
@@ -311,7 +342,6 @@ mod tests {
         // The rate of the scene is 240 Hz, so the ball has risen by 1 m.
         let mut stage = Stage::new(SCENE, 120);
         let mut carrier = Carrier::default();
-        carrier.advance(&stage.state());
         stage.carry(&mut carrier, ADA, [0.4, 0.0, 0.0], 0.04).unwrap();
         let moves = stage.moves(&mut carrier, 6);
         let expected = [0.1, 0.2, 0.3, 0.4].map(|x| [x, 1.0, 0.0]);
@@ -320,9 +350,17 @@ mod tests {
         assert!(!carrier.is_moving());
         // The next target is relative to the same beginning, and reached even if steps are missed.
         stage.carry(&mut carrier, ADA, [0.4, -0.4, 0.0], 0.04).unwrap();
-        stage.header.step += 2;
-        assert!(near(stage.moves(&mut carrier, 1)[0], [0.4, 0.7, 0.0]));
+        assert!(near(stage.moves(&mut carrier, 2)[1], [0.4, 0.8, 0.0]));
+        stage.header.step += 1;
         assert!(near(stage.moves(&mut carrier, 1)[0], [0.4, 0.6, 0.0]));
+        assert!(!carrier.is_moving());
+        // However long it has rested, and however old the newest state is, the next motion begins with its first part.
+        stage.carry(&mut carrier, ADA, [0.0, -0.4, 0.0], 0.04).unwrap();
+        let at_once = carrier.advance(&stage.state());
+        assert!(matches!(at_once[..], [Action::MoveCollider { .. }]), "{at_once:?}");
+        assert!(carrier.advance(&stage.state()).is_empty());
+        stage.header.step += 50;
+        assert!(near(stage.moves(&mut carrier, 1)[0], [0.2, 0.6, 0.0]));
         // Without time it is there in the next step.
         stage.carry(&mut carrier, ADA, [0.0, 0.0, 0.0], 0.0).unwrap();
         assert!(near(stage.moves(&mut carrier, 3)[0], [0.0, 1.0, 0.0]));
@@ -334,7 +372,6 @@ mod tests {
     fn a_thrown_object_slows_down_to_rest() {
         let mut stage = Stage::new(SCENE, 0);
         let mut carrier = Carrier::default();
-        carrier.advance(&stage.state());
         stage.carry(&mut carrier, ADA, [0.0; 3], 0.0).unwrap();
         stage.moves(&mut carrier, 1);
         carrier.throw(ADA, BALL, [2.0, 0.0, -1.0]).unwrap();

@@ -236,11 +236,11 @@ impl Link {
                 command: command @ (Command::Carry { .. } | Command::Throw { .. }),
             } => {
                 let outcome = match self.carry(client, &command, shown) {
-                    Ok(()) => {
-                        OutcomeText { applied: 1, ..OutcomeText::pending(id, command.name()) }
-                    }
+                    Ok(()) => OutcomeText::applied(id, command.name()),
                     Err(reason) => OutcomeText::refused(id, command.name(), reason),
                 };
+                // A motion that begins does so with the next step.
+                self.move_carried(sinks);
                 if id.is_some() || outcome.applied == 0 {
                     sinks.publish(&Update::Answer { client, outcome: &outcome });
                 }

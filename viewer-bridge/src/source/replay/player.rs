@@ -160,8 +160,7 @@ impl<'a> Player<'a> {
             RequestKind::Command { id, command } => match self.obey(&command)? {
                 Ok(()) => {
                     self.is_playback_changed = true;
-                    let outcome = OutcomeText::pending(id, command.name());
-                    let outcome = OutcomeText { applied: 1, ..outcome };
+                    let outcome = OutcomeText::applied(id, command.name());
                     self.answers.push(Answer { client, outcome });
                 }
                 Err(reason) => {
