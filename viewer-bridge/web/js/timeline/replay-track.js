@@ -8,6 +8,9 @@ import { clockText, zoomed } from "./timeline.js";
 /** Rates to choose from; a different rate set by another page is added. */
 const RATES = [0.1, 0.25, 0.5, 1, 2, 5, 10];
 
+/** States of a ghost whose text is about to change. */
+const PROGRESS = new Set(["opening", "comparing"]);
+
 /** Pixels that a notch of the wheel scrolls in most browsers. A touchpad sends many small turns. */
 const NOTCH = 100;
 
@@ -173,6 +176,8 @@ export class ReplayTrack {
     find("ghost-choice", HTMLElement).hidden = names.length === 0;
     this.ghost.replaceChildren(make("option", { value: "" }, "none"), ...names.map((name) => make("option", { value: name }, name)));
     this.ghost.value = ghostChoice?.name ?? "";
+    // Screen readers announce the result, not the progress.
+    this.ghostNote.ariaLive = ghostChoice === null || PROGRESS.has(ghostChoice.state) ? "off" : "polite";
     this.ghostNote.textContent = this.ghostNote.title = ghostChoice?.text ?? "";
     this.ghostNote.classList.toggle("is-good", ghostChoice?.state === "equal");
     this.ghostNote.classList.toggle("is-bad", ghostChoice?.state === "failed");
