@@ -8,6 +8,7 @@ import { add, addScaled, clamp, dot, length, multiply, normalize, scale, subtrac
 /** @typedef {import("./math.js").Mat4} Mat4 */
 /** @typedef {{ right: Vec3, up: Vec3, toward: Vec3 }} Axes  axes of the camera at zero yaw and pitch, in world space */
 /** @typedef {{ width: number, height: number }} Viewport  in CSS pixels */
+/** Unit vectors of a picture: right, up, and from the target to the eye. @typedef {{ right: Vec3, up: Vec3, back: Vec3 }} Basis */
 /** @typedef {{ origin: Vec3, direction: Vec3 }} Ray */
 
 /** Vertical field of view, radians. */
@@ -45,19 +46,19 @@ export class Camera {
     this.pitch = 0.2;
     /** Radius of the scene: limits the distance and the clipping planes. */
     this.sceneRadius = 1;
+    /** The last basis, and what it belongs to: a picture asks for it a dozen times. */
+    this.known = { axes: this.axes, yaw: NaN, pitch: NaN, basis: /** @type {Basis | null} */ (null) };
   }
 
-  /** Unit vectors of the picture: right, up, and from the target to the eye. */
+  /** Unit vectors of the picture: right, up, and from the target to the eye. Do not change them. @returns {Basis} */
   basis() {
-    const { right, up, toward } = this.axes;
     const yaw = this.isFlat ? 0 : this.yaw;
     const pitch = this.isFlat ? 0 : this.pitch;
-    const outward = add(scale(right, Math.sin(yaw)), scale(toward, Math.cos(yaw)));
-    return {
-      right: add(scale(right, Math.cos(yaw)), scale(toward, -Math.sin(yaw))),
-      up: add(scale(up, Math.cos(pitch)), scale(outward, -Math.sin(pitch))),
-      back: add(scale(outward, Math.cos(pitch)), scale(up, Math.sin(pitch))),
-    };
+    const { known, axes } = this;
+    if (known.basis !== null && known.axes === axes && known.yaw === yaw && known.pitch === pitch) return known.basis;
+    const basis = basisOf(axes, yaw, pitch);
+    this.known = { axes, yaw, pitch, basis };
+    return basis;
   }
 
   /** @returns {Vec3} */
@@ -172,4 +173,14 @@ export class Camera {
       this.distance = Math.max(this.distance, closer + Math.max(Math.abs(dot(at, up)), Math.abs(dot(at, right)) / aspect) / slope);
     }
   }
+}
+
+/** @param {Axes} axes @param {number} yaw @param {number} pitch @returns {Basis} */
+function basisOf({ right, up, toward }, yaw, pitch) {
+  const outward = add(scale(right, Math.sin(yaw)), scale(toward, Math.cos(yaw)));
+  return {
+    right: add(scale(right, Math.cos(yaw)), scale(toward, -Math.sin(yaw))),
+    up: add(scale(up, Math.cos(pitch)), scale(outward, -Math.sin(pitch))),
+    back: add(scale(outward, Math.cos(pitch)), scale(up, Math.sin(pitch))),
+  };
 }

@@ -28,6 +28,9 @@ export function rendererName(gl) {
 /** True for a renderer without a graphics processor, for which effects are too slow. @param {string} name */
 export const isSoftware = (name) => /swiftshader|llvmpipe|lavapipe|softpipe|software|basic render/i.test(name);
 
+/** @type {Record<string, number | number[]>} */
+const NONE = {};
+
 /** A linked program, with the locations of its uniforms. */
 export class Program {
   /** @param {GL} gl @param {string} vertex @param {string} fragment */
@@ -36,12 +39,15 @@ export class Program {
     this.handle = link(gl, vertex, fragment);
     /** @type {Map<string, WebGLUniformLocation>} */
     this.locations = new Map();
+    /** The names of the uniforms, for loops that must not allocate. @type {string[]} */
+    this.names = [];
     const count = gl.getProgramParameter(this.handle, gl.ACTIVE_UNIFORMS);
     for (let index = 0; index < count; index++) {
       const uniform = gl.getActiveUniform(this.handle, index);
       const location = uniform && gl.getUniformLocation(this.handle, uniform.name);
       if (uniform && location) this.locations.set(uniform.name.replace("[0]", ""), location);
     }
+    this.names = [...this.locations.keys()];
   }
 
   delete() {
@@ -52,13 +58,14 @@ export class Program {
     this.gl.useProgram(this.handle);
   }
 
-  /** Sets uniforms, choosing the type by the length of the value. Ignores uniforms that the compiler removed.
-   * @param {Record<string, number | number[]>} values */
-  set(values) {
+  /** Sets the uniforms that have a value, choosing the type by its length. Values of `own` come before the others.
+   * @param {Record<string, number | number[]>} values @param {Record<string, number | number[]>} own */
+  set(values, own = NONE) {
     const { gl } = this;
-    for (const [name, value] of Object.entries(values)) {
-      const location = this.locations.get(name);
-      if (location === undefined) continue;
+    for (const name of this.names) {
+      const value = own[name] ?? values[name];
+      if (value === undefined) continue;
+      const location = this.locations.get(name) ?? null;
       if (typeof value === "number") gl.uniform1f(location, value);
       else if (value.length === 2) gl.uniform2fv(location, value);
       else if (value.length === 3) gl.uniform3fv(location, value);

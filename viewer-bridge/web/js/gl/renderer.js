@@ -2,7 +2,7 @@
 // only if something has.
 
 import { add, addScaled, dot, multiply, normalize, scale, scaleThenMove, shadowOnto, tangents } from "../geometry/math.js";
-import { HEAT_STOPS, KIND_COLORS, linear, paletteOf } from "./theme.js";
+import { paletteOf, paletteUniforms } from "./theme.js";
 import { PAINT } from "./shaders.js";
 import { isSoftware, openContext, rendererName } from "./context.js";
 import { Arrows } from "./arrows.js";
@@ -22,8 +22,6 @@ import { polesOf } from "../state/shapes.js";
 
 /** Limit on device pixels per CSS pixel: the cost grows with the square, and a finer picture looks the same. */
 const PIXEL_RATIO_MAX = 2;
-const HEAT_COLORS = HEAT_STOPS.flatMap((hex) => linear(hex));
-const KIND_UNIFORM = KIND_COLORS.flatMap((hex) => linear(hex));
 /** Distance of the lamp, in radii of the scene. */
 const LAMP_RADII = 2.6;
 /** Size of the ground, in radii of the scene; it fades out towards its edge. */
@@ -274,24 +272,22 @@ export class Renderer {
     const basis = camera.basis();
     this.lightView = this.viewOfLight(light);
     return {
+      ...paletteUniforms(this.isDark),
       u_view_projection: multiply(projection, camera.view()),
       u_lo: simulation.frame?.lo ?? [0, 0, 0], u_scale: simulation.frame?.scale ?? [1, 1, 1],
       u_viewport: [canvas.width, canvas.height], u_eye: camera.eye(), u_up: up, u_light: light,
       // Close enough that a flat cloth is not uniformly lit. The shadow treats the light as distant.
       u_lamp: addScaled(simulation.middle(), light, simulation.radius() * LAMP_RADII),
       u_pixels_per_unit: (projection[5] * canvas.height) / 2, u_near: isFlat ? 0 : camera.distance * 0.02,
-      u_sky: palette.sky, u_bounce: palette.bounce, u_key: palette.key,
-      u_paint: this.paint(), u_heat_low: this.coloring.low, u_heat_high: this.coloring.high, u_heat_stops: HEAT_COLORS,
-      u_unknown: palette.unknown, u_kinds: KIND_UNIFORM,
-      u_front: palette.front, u_back: palette.back, u_flat: isFlat ? [...palette.flatSurface, 0.85] : [0, 0, 0, 0],
-      u_stick: isFlat && hasSurface ? palette.flatStick : palette.stick, u_stick_faint: palette.stickFaint,
+      u_paint: this.paint(), u_heat_low: this.coloring.low, u_heat_high: this.coloring.high,
+      u_flat: isFlat ? [...palette.flatSurface, 0.85] : [0, 0, 0, 0],
+      u_stick: isFlat && hasSurface ? palette.flatStick : palette.stick,
       // A dark ball is invisible on the dark end of the heat map.
-      u_particle: this.toggles.heat && this.toggles.surface && hasSurface ? palette.ring : palette.particle, u_ring: palette.ring, u_collider: palette.collider,
-      u_marks: [...palette.pin, ...palette.anchor, ...palette.grabbed, ...palette.frozen],
+      u_particle: this.toggles.heat && this.toggles.surface && hasSurface ? palette.ring : palette.particle,
       u_particle_count: simulation.scene?.particleCount ?? 0, u_round: 1, u_opacity: 1, u_forward: 0, u_shadow: 0, u_is_all: 1,
       u_ground: ground ? [...ground.normal, ground.offset] : [...up, -1e9],
       u_right: basis.right, u_upward: basis.up, u_is_solid: this.hasEffects() ? 1 : 0,
-      u_thread: (this.buffers?.spacing ?? 1) * THREAD_SPACINGS, u_wood: palette.wood, u_pole: palette.pole, u_body: palette.body,
+      u_thread: (this.buffers?.spacing ?? 1) * THREAD_SPACINGS,
       u_to_shadow_map: this.lightView?.map ?? NOWHERE, u_texel: this.lightView?.texel ?? 0,
       ...this.sizes(ratio, hasSurface, isFlat),
     };
@@ -376,7 +372,7 @@ export class Renderer {
     this.colliders?.draw(shadow);
     if (this.toggles.surface) this.drawables?.cloth.drawShadow(shadow);
     // The flattening matrix scales w by its last element, and sizes in pixels are divided by w.
-    this.drawSticks({ ...shadow, u_pixels_per_unit: /** @type {number} */ (uniforms.u_pixels_per_unit) * flattened[15] });
+    this.drawSticks(shadow, { u_pixels_per_unit: /** @type {number} */ (uniforms.u_pixels_per_unit) * flattened[15] });
     gl.disable(gl.STENCIL_TEST);
   }
 
@@ -400,8 +396,8 @@ export class Renderer {
     if (this.buffers === null || drawables === null) return;
     if (this.toggles.surface) drawables.cloth.draw(uniforms);
     drawables.planks?.draw(uniforms);
-    this.drawSticks({ ...uniforms, u_forward: 4e-4, u_opacity: this.hasSurface() ? 0.75 : 1 });
-    this.drawPoints({ ...uniforms, u_forward: 1.2e-3 });
+    this.drawSticks(uniforms, { u_forward: 4e-4, u_opacity: this.hasSurface() ? 0.75 : 1 });
+    this.drawPoints(uniforms, { u_forward: 1.2e-3, u_round: 1 });
   }
 
   /** Draws a 2-D scene without a depth test: later layers cover earlier ones. @param {Uniforms} uniforms */
@@ -412,14 +408,14 @@ export class Renderer {
     this.colliders?.draw({ ...uniforms, u_flat: [...palette.collider, 0.55] });
     if (this.buffers === null || drawables === null) return;
     if (this.toggles.surface) drawables.cloth.draw(uniforms);
-    this.drawSticks({ ...uniforms, u_round: 0.35 });
-    this.drawPoints({ ...uniforms, u_round: 0.6 });
+    this.drawSticks(uniforms, { u_round: 0.35 });
+    this.drawPoints(uniforms, { u_forward: 0, u_round: 0.6 });
   }
 
-  /** @param {Uniforms} uniforms */
-  drawSticks(uniforms) {
+  /** @param {Uniforms} uniforms @param {Uniforms} own uniforms that come before those */
+  drawSticks(uniforms, own = {}) {
     const isAll = this.toggles.sticks || this.paint() === PAINT.kinds || !this.hasSurface() || !this.toggles.surface;
-    this.drawables?.sticks.draw({ ...uniforms, u_is_all: isAll ? 1 : 0 });
+    this.drawables?.sticks.draw(uniforms, { ...own, u_is_all: isAll ? 1 : 0 });
   }
 
   /** @param {Uniforms} uniforms */
@@ -428,21 +424,21 @@ export class Renderer {
     if (simulation.ghost === null || !buffers?.ghost) return;
     const isFlat = simulation.scene?.isPlanar ?? false;
     const color = paletteOf(this.isDark).ghost;
-    buffers.ghost.draw({ ...uniforms, u_stick: color, u_stick_faint: color, u_forward: isFlat ? 0 : 4e-4 }, buffers.positions, isFlat);
+    buffers.ghost.draw(uniforms, buffers.positions, { isFlat, color, forward: isFlat ? 0 : 4e-4 });
   }
 
-  /** @param {Uniforms} uniforms */
-  drawPoints(uniforms) {
+  /** @param {Uniforms} uniforms @param {{ u_forward: number, u_round: number }} own uniforms that come before those */
+  drawPoints(uniforms, own) {
     const { drawables, toggles } = this;
     if (drawables === null) return;
-    const particles = { ...uniforms, u_radius: uniforms.u_point_radius, u_radius_min: uniforms.u_point_min };
-    if (toggles.particles) drawables.points.draw(drawables.points.particles, particles);
-    const marks = { ...particles, u_radius_min: uniforms.u_mark_min, u_forward: /** @type {number} */ (uniforms.u_forward) * 2 };
+    const particles = { ...own, u_radius: uniforms.u_point_radius, u_radius_min: uniforms.u_point_min };
+    if (toggles.particles) drawables.points.draw(drawables.points.particles, uniforms, particles);
+    const marks = { ...particles, u_radius_min: uniforms.u_mark_min, u_forward: own.u_forward * 2 };
     if (!toggles.pins) return;
-    drawables.points.draw(drawables.points.marks, marks);
+    drawables.points.draw(drawables.points.marks, uniforms, marks);
     // A grabbed particle stays visible behind a fold.
     this.gl.disable(this.gl.DEPTH_TEST);
-    drawables.points.draw(drawables.points.grabbed, marks);
+    drawables.points.draw(drawables.points.grabbed, uniforms, marks);
   }
 
   /** @param {Uniforms} uniforms */

@@ -33,24 +33,24 @@ export class Charts {
     this.own = this.userPlots();
     this.solver = this.solverPlots();
     this.selected = new SelectionPlots(app, FRAME_SAMPLES);
+    /** All plots, in their order. @type {Plot[]} */
+    this.plots = [];
     /** Simulation time at the right end. */
     this.now = 0;
     /** The right end while the plots are held. @type {number | null} */
     this.heldAt = null;
     /** @type {number | null} */
     this.cursor = null;
-    /** Plots of this round that are drawn, one per animation frame. All of a round have the same window. */
+    /** Plots of this round that are drawn, one in every second animation frame. All of a round have the same window. */
     this.drawn = 0;
     this.isStale = true;
+    /** The next animation frame draws no plot. */
+    this.isDrawing = false;
     /** @type {import("./plot.js").Window} */
     this.round = { from: 0, to: 0, cursor: null, gap: GAP_S };
     find("solver-plots", HTMLElement).replaceChildren(...this.solver.map((one) => one.element));
     this.arrange();
     this.listen();
-  }
-
-  get plots() {
-    return [...this.own, ...this.selected.plots, ...this.solver];
   }
 
   userPlots() {
@@ -99,6 +99,7 @@ export class Charts {
   arrange() {
     this.selected.rebuild();
     if (this.heldAt !== null) this.selected.plots.forEach((one) => one.hold(true));
+    this.plots = [...this.own, ...this.selected.plots, ...this.solver];
     this.box.replaceChildren(...this.own.map((one) => one.element), ...this.selected.plots.map((one) => one.element));
     this.redraw();
   }
@@ -160,9 +161,11 @@ export class Charts {
     this.isStale = true;
   }
 
-  /** Draws one plot per animation frame, so that none takes long. */
+  /** Draws one plot in every second animation frame, so that none takes long: each is new about eight times a second. */
   tick() {
     const { plots } = this;
+    this.isDrawing = !this.isDrawing;
+    if (!this.isDrawing) return;
     if (this.drawn >= plots.length) {
       if (!this.isStale || document.body.classList.contains("panel-away")) return;
       this.isStale = false;
@@ -255,6 +258,7 @@ function seriesOf() {
 export function heights({ bounds: { min, max }, particleCount }, up) {
   if (particleCount === 0) return { low: NaN, high: NaN };
   const axis = up.findIndex((one) => one !== 0);
-  const ends = [min[axis] * up[axis], max[axis] * up[axis]];
-  return { low: Math.min(...ends), high: Math.max(...ends) };
+  const a = min[axis] * up[axis];
+  const b = max[axis] * up[axis];
+  return { low: Math.min(a, b), high: Math.max(a, b) };
 }

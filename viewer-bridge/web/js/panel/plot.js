@@ -99,14 +99,12 @@ export function drawLine(context, series, { from, to, gap }, width, y, color) {
   context.strokeStyle = color;
   context.lineWidth = 1.4;
   context.beginPath();
-  let [column, min, max, before, isDown] = [-1, Infinity, -Infinity, -Infinity, false];
-  const flush = () => {
-    if (min > max) return;
-    if (isDown) context.lineTo(column + 0.5, y(max));
-    else context.moveTo(column + 0.5, y(max));
-    context.lineTo(column + 0.5, y(min) + (min === max && !isDown ? 1 : 0));
-    isDown = true;
-  };
+  // No closure changes these: such variables would allocate a number for every sample.
+  let column = -1;
+  let min = Infinity;
+  let max = -Infinity;
+  let before = -Infinity;
+  let isDown = false;
   for (let index = Math.max(series.indexFrom(from) - 1, 0); index < series.size; index++) {
     const time = series.timeAt(index);
     if (time > to) break;
@@ -114,13 +112,24 @@ export function drawLine(context, series, { from, to, gap }, width, y, color) {
     const at = Math.floor(((time - from) / (to - from)) * width);
     const isBroken = Number.isNaN(value) || time - before > gap;
     if (at !== column || isBroken) {
-      flush();
-      [column, min, max] = [at, Infinity, -Infinity];
-      if (isBroken) isDown = false;
+      if (min <= max) drawColumn(context, column, y(max), y(min), isDown);
+      isDown = !isBroken && (isDown || min <= max);
+      column = at;
+      min = Infinity;
+      max = -Infinity;
     }
-    if (!Number.isNaN(value)) [min, max] = [Math.min(min, value), Math.max(max, value)];
+    if (value < min) min = value;
+    if (value > max) max = value;
     before = time;
   }
-  flush();
+  if (min <= max) drawColumn(context, column, y(max), y(min), isDown);
   context.stroke();
+}
+
+/** Goes on from the maximum to the minimum of a column. Without a column before it, a single value is a dot.
+ * @param {CanvasRenderingContext2D} context @param {number} column @param {number} top @param {number} bottom @param {boolean} isDown */
+function drawColumn(context, column, top, bottom, isDown) {
+  if (isDown) context.lineTo(column + 0.5, top);
+  else context.moveTo(column + 0.5, top);
+  context.lineTo(column + 0.5, bottom + (top === bottom && !isDown ? 1 : 0));
 }

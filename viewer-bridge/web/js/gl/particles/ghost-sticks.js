@@ -41,19 +41,19 @@ export class GhostSticks {
   }
 
   /** Draws over the picture. Afterwards, the positions are those of `others` again.
-   * @param {Record<string, number | number[]>} uniforms @param {ArrayTexture} others @param {boolean} isFlat */
-  draw(uniforms, others, isFlat) {
+   * @param {Record<string, number | number[]>} uniforms @param {ArrayTexture} others @param {{ isFlat: boolean, color: number[], forward: number }} style */
+  draw(uniforms, others, { isFlat, color, forward }) {
     const { gl } = this;
-    const ghost = { ...uniforms, u_lo: [0, 0, 0], u_scale: [1, 1, 1], u_paint: PAINT.off, u_is_all: 1, u_is_solid: 0, u_radius: 0, u_round: 0 };
+    const ghost = { u_lo: [0, 0, 0], u_scale: [1, 1, 1], u_paint: PAINT.off, u_is_all: 1, u_is_solid: 0, u_radius: 0, u_round: 0, u_stick: color, u_stick_faint: color, u_forward: forward };
     this.positions.bind();
     if (!isFlat) {
       gl.depthMask(false);
       gl.depthFunc(gl.GREATER);
-      this.sticks.draw({ ...ghost, u_opacity: OPACITY.hidden });
+      this.sticks.draw(uniforms, { ...ghost, u_opacity: OPACITY.hidden });
       gl.depthMask(true);
       gl.depthFunc(gl.LEQUAL);
     }
-    this.sticks.draw({ ...ghost, u_opacity: OPACITY.visible });
+    this.sticks.draw(uniforms, { ...ghost, u_opacity: OPACITY.visible });
     others.bind();
   }
 

@@ -81,12 +81,12 @@ export class Points {
     this.grabbed = new PointList(gl);
   }
 
-  /** @param {PointList} list @param {Record<string, number | number[]>} uniforms */
-  draw(list, uniforms) {
+  /** @param {PointList} list @param {Record<string, number | number[]>} uniforms @param {Record<string, number | number[]>} own uniforms that come before those */
+  draw(list, uniforms, own) {
     if (list.count === 0) return;
     const { gl } = this;
     this.program.use();
-    this.program.set(uniforms);
+    this.program.set(uniforms, own);
     gl.bindVertexArray(list.vao);
     gl.drawArrays(gl.POINTS, 0, list.count);
     gl.bindVertexArray(null);

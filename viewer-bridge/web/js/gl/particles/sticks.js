@@ -205,12 +205,12 @@ export class Sticks {
     gl.bufferSubData(gl.ARRAY_BUFFER, 0, this.words);
   }
 
-  /** @param {Record<string, number | number[]>} uniforms */
-  draw(uniforms) {
+  /** @param {Record<string, number | number[]>} uniforms @param {Record<string, number | number[]>} [own] uniforms that come before those */
+  draw(uniforms, own) {
     if (this.drawn.length === 0) return;
     const { gl } = this;
     this.program.use();
-    this.program.set(uniforms);
+    this.program.set(uniforms, own);
     gl.bindVertexArray(this.vao);
     gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, this.drawn.length);
     gl.bindVertexArray(null);
