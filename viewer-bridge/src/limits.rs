@@ -53,6 +53,9 @@ pub const COMMANDS_QUEUED_MAX: usize = 4096;
 pub const CONSTRAINTS_PER_CUT_MAX: usize = 256;
 /// Particles that one client grabs at a time: ten fingers and a few spare.
 pub const GRABS_PER_CLIENT_MAX: usize = 16;
+/// Objects that are carried or glide at a time. Each needs a command in every step, and the node's queue for a
+/// client has room for 256.
+pub const CARRIED_MAX: usize = 64;
 /// Particles that a page inspects at a time: a selection of a dozen constraints has two dozen ends.
 pub const PARTICLES_INSPECTED_MAX: usize = 32;
 /// Steps in one command.

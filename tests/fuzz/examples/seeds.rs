@@ -16,7 +16,7 @@ const COMMANDS: &str = include_str!("../commands.jsonl");
 const MESH: &str =
     "# A square.\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\ng left\nf 1 2 3\no right\nf -4/1 3//2 4\n";
 /// Messages of a page that are not actions of the node.
-const PAGE_MESSAGES: [&str; 9] = [
+const PAGE_MESSAGES: [&str; 10] = [
     r#"{"type":"hello","protocol":1,"token":"abc","format":"u16"}"#,
     r#"{"type":"ack","frame":7}"#,
     r#"{"type":"brush","eye":[0,0,1],"ray":[0,0,-1],"radius":0.1,"delta":[0.1,0,0],"over_s":0.1,"cap":0.5}"#,
@@ -24,6 +24,7 @@ const PAGE_MESSAGES: [&str; 9] = [
     r#"{"type":"seek","step":10}"#,
     r#"{"type":"loop","is_on":true}"#,
     r#"{"type":"ghost","name":"changed"}"#,
+    r#"{"type":"lift","epoch":1,"object":"collider","index":0}"#,
     r#"{"type":"carry","object":"collider","index":0,"offset":[0.1,0,0],"over_s":0.02}"#,
     r#"{"type":"throw","object":"anchor","index":0,"velocity":[1,0,0]}"#,
 ];

@@ -50,7 +50,7 @@ impl Stage {
         stage
     }
 
-    /// Makes a step without a look at it.
+    /// Makes a step and ignores its frame.
     fn skip_step(&mut self) {
         self.step = self.page.applied(json!({ "type": "step" }));
     }
@@ -91,9 +91,12 @@ fn a_page_carries_a_ball_and_an_anchor_in_equal_parts_and_throws_them() {
     assert_eq!(bridge.page().scene().text.anchors, [vec![0]]);
 
     let begin = stage.make_step();
-    let object = |kind: &str| json!({ "type": "carry", "object": kind, "index": 0, "offset": [0.4, 0, 0], "over_s": 0.04 });
-    for kind in ["collider", "anchor"] {
-        let answer = stage.page.command(object(kind));
+    let epoch = bridge.page().scene().stamp.epoch;
+    let lift = |kind: &str| json!({ "type": "lift", "epoch": epoch, "object": kind, "index": 0 });
+    let carry = |kind: &str| json!({ "type": "carry", "object": kind, "index": 0, "offset": [0.4, 0, 0], "over_s": 0.04 });
+    assert_eq!(stage.page.rejected(carry("collider")), "not_grabbed");
+    for message in [lift("collider"), lift("anchor"), carry("collider"), carry("anchor")] {
+        let answer = stage.page.command(message);
         assert_eq!(answer["status"], "applied", "{answer}");
     }
     for part in 1..=4_u8 {
@@ -105,7 +108,7 @@ fn a_page_carries_a_ball_and_an_anchor_in_equal_parts_and_throws_them() {
     assert!(near(there.ball, along_x(begin.ball, 0.4)), "it waits: {there:?}");
 
     let mut other = bridge.page();
-    assert_eq!(other.rejected(object("collider")), "grabbed_by_other");
+    assert_eq!(other.rejected(lift("collider")), "grabbed_by_other");
     let throw = |kind: &str, x: f64| json!({ "type": "throw", "object": kind, "index": 0, "velocity": [x, 0, 0] });
     assert_eq!(other.rejected(throw("collider", 1.0)), "not_grabbed");
     stage.page.send(&throw("anchor", 0.0));
@@ -122,11 +125,29 @@ fn a_page_carries_a_ball_and_an_anchor_in_equal_parts_and_throws_them() {
     let next = stage.make_step();
     assert!(near(next.ball, [3.0, back.ball[1] + 0.01, 0.0]), "{back:?} {next:?}");
     assert!(near(next.anchored, [0.0, 1.0, 0.0]), "{next:?}");
+    // A target that was on its way then moves nothing.
+    assert_eq!(stage.page.rejected(carry("anchor")), "not_grabbed");
     for (kind, index, reason) in
         [("collider", 1, "unknown_collider"), ("anchor", 1, "unknown_anchor")]
     {
-        let message =
-            json!({ "type": "carry", "object": kind, "index": index, "offset": [0, 0, 0] });
+        let message = json!({ "type": "lift", "epoch": epoch, "object": kind, "index": index });
         assert_eq!(stage.page.rejected(message), reason);
     }
+    let message = json!({ "type": "lift", "epoch": epoch + 1, "object": "anchor", "index": 0 });
+    assert_eq!(stage.page.rejected(message), "stale_epoch");
+}
+
+#[test]
+fn a_carried_object_is_a_change_of_others_to_a_page_that_undoes() {
+    let sandbox = Sandbox::new();
+    let scene = sandbox.write("stage.toml", SCENE);
+    let _node = Process::start_ready(Program::SimNode, &sandbox, &["run", &scene]);
+    let bridge = Bridge::start(&sandbox);
+    let (mut page, mut other) = (bridge.page(), bridge.page());
+    let epoch = page.scene().stamp.epoch;
+    page.frame(|_| true);
+    page.applied(json!({ "type": "cut", "epoch": epoch, "constraints": [0] }));
+    let lift = json!({ "type": "lift", "epoch": epoch, "object": "collider", "index": 0 });
+    assert_eq!(other.command(lift)["status"], "applied");
+    assert_eq!(page.rejected(json!({ "type": "undo" })), "changed_by_others");
 }

@@ -82,6 +82,7 @@ pub fn check(command: &Command) -> Result<(), Reason> {
         | Command::Undo { .. }
         | Command::Record {}
         | Command::StopRecording {}
+        | Command::Lift { .. }
         | Command::Seek { .. }
         | Command::Ghost { .. }
         | Command::Loop { .. } => Ok(()),

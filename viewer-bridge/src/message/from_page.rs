@@ -150,6 +150,11 @@ pub enum Command {
         #[serde(default = "no_rotation")]
         rotation: [f32; 4],
     },
+    Lift {
+        epoch: u32,
+        object: ObjectKind,
+        index: u32,
+    },
     Carry {
         object: ObjectKind,
         index: u32,
@@ -242,6 +247,7 @@ impl Command {
             Self::MoveCollider { .. } => "move_collider",
             Self::DriveBody(_) => "drive_body",
             Self::MoveAnchor { .. } => "move_anchor",
+            Self::Lift { .. } => "lift",
             Self::Carry { .. } => "carry",
             Self::Throw { .. } => "throw",
             Self::Pause {} => "pause",

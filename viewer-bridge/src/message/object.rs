@@ -1,8 +1,8 @@
-//! Things that a page carries.
+//! Colliders and anchors that a page can carry.
 
 use serde::Deserialize;
 
-/// Kind of thing that a page carries.
+/// Kind of object that a page can carry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ObjectKind {
@@ -12,7 +12,7 @@ pub enum ObjectKind {
     Anchor,
 }
 
-/// A thing that a page carries, by its index among its kind.
+/// An object that a page can carry, by its index among its kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Object {
     /// A collider.

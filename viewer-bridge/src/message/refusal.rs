@@ -182,8 +182,9 @@ fn reason_text(reason: Reason, kind: &str) -> Cow<'static, str> {
         (Reason::UnknownStep, "look") => {
             "no past state is kept yet; the viewer keeps those that a page has shown"
         }
-        (Reason::GrabbedByOther, "carry") => {
-            "another page carries it; it is free once that page lets it go"
+        (Reason::GrabbedByOther, "lift") => {
+            "another page carries it, or clients hold all particles of the anchor; it is free once they \
+             release it"
         }
         (Reason::GrabbedByOther, _) => {
             "another client has grabbed the particle; it is free once that client releases it"

@@ -8,6 +8,7 @@ mod dispatch;
 mod link;
 mod newest_state;
 mod node_text;
+mod outcomes;
 mod statistics;
 #[cfg(test)]
 mod tests;

@@ -138,7 +138,7 @@ fn to_page_of_a_replay() -> Vec<ToPage> {
 }
 
 /// One message of each kind that a page may send.
-const FROM_PAGE: [&str; 41] = [
+const FROM_PAGE: [&str; 42] = [
     r#"{"type":"hello","protocol":2,"token":"00","format":"u16"}"#,
     r#"{"type":"hello","protocol":2}"#,
     r#"{"type":"ack","frame":77}"#,
@@ -157,6 +157,7 @@ const FROM_PAGE: [&str; 41] = [
     r#"{"type":"cut_radius","center":[0,0,0],"radius":0.1}"#,
     r#"{"type":"move_collider","collider":0,"translation":[0.5,0,0],"rotation":[0,0.6,0,0.8]}"#,
     r#"{"type":"move_anchor","anchor":0,"translation":[0,0.3,0]}"#,
+    r#"{"type":"lift","epoch":3,"object":"anchor","index":0}"#,
     r#"{"type":"carry","object":"anchor","index":0,"offset":[0.1,0,0],"over_s":0.02}"#,
     r#"{"type":"throw","object":"collider","index":1,"velocity":[2,0,0]}"#,
     r#"{"type":"pause"}"#,

@@ -74,6 +74,7 @@ pub(super) fn actions(
         }
         // The server of the pages and the link answer them.
         Command::Look { .. }
+        | Command::Lift { .. }
         | Command::Carry { .. }
         | Command::Throw { .. }
         | Command::Undo { .. }

@@ -9,6 +9,7 @@ use sim_contract::{Action, ColliderFields, ColliderShape, ColliderState, Particl
 use sim_solver::Pose;
 
 use super::newest_state::LoadedState;
+use crate::limits::CARRIED_MAX;
 use crate::message::{Object, Refusal};
 use crate::request::ClientId;
 use crate::wire::convert::to_f32;
@@ -18,19 +19,27 @@ const GLIDE_S: f64 = 0.3;
 /// Time after which it is at rest: at 1/3000 of its velocity, in s.
 const GLIDE_END_S: f64 = 8.0 * GLIDE_S;
 /// Flags of a particle that its anchor does not drive.
-const HELD: u32 = ParticleFlags::PINNED | ParticleFlags::GRABBED | ParticleFlags::FROZEN;
+const NOT_DRIVEN: u32 = ParticleFlags::PINNED | ParticleFlags::GRABBED | ParticleFlags::FROZEN;
 
-/// The objects that clients carry or have thrown.
+/// The objects that clients carry or have released in motion.
 #[derive(Debug, Default)]
 pub(super) struct Carrier {
     objects: BTreeMap<Object, Carried>,
 }
 
+/// The state in which an object is lifted.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Place<'a> {
+    pub(super) state: &'a LoadedState<'a>,
+    pub(super) colliders: &'a [ColliderState],
+}
+
 /// An object and its motion.
 #[derive(Debug, Clone, Copy)]
 struct Carried {
-    client: ClientId,
-    /// Pose at which the client began to carry it.
+    /// The client that carries it; `None` once it is released.
+    client: Option<ClientId>,
+    /// Pose at which the client lifted it.
     begin: Pose,
     /// Offset from there in the last step that was sent.
     offset: [f64; 3],
@@ -52,47 +61,54 @@ enum Moved {
 #[derive(Debug, Clone, Copy)]
 enum Motion {
     /// It reaches the target with an equal part of the way in each step, and waits there.
-    Carried { target: [f64; 3], steps_left: f64 },
+    Towards { target: [f64; 3], steps_left: f64 },
     /// It slows down.
-    Thrown { velocity: [f64; 3], left_s: f64 },
+    Gliding { velocity: [f64; 3], left_s: f64 },
 }
 
 impl Carrier {
-    /// Moves an object towards an offset from the pose at which the client began to carry it.
+    /// Begins to carry an object.
     ///
     /// # Errors
-    /// The scene has no such object, or another client carries it.
+    /// The scene has no such object, another client carries it, or too many objects are carried.
+    pub(super) fn lift(
+        &mut self,
+        client: ClientId,
+        object: Object,
+        place: Place<'_>,
+    ) -> Result<(), Refusal> {
+        let known = self.objects.get(&object);
+        if known.is_some_and(|one| one.client.is_some_and(|other| other != client)) {
+            return Err(Reason::GrabbedByOther.into());
+        }
+        if known.is_none() && self.objects.len() >= CARRIED_MAX {
+            return Err(Refusal::Busy);
+        }
+        let begin = place.pose(object)?;
+        let motion = Motion::Towards { target: [0.0; 3], steps_left: 0.0 };
+        let (client, offset, moved) = (Some(client), [0.0; 3], Moved::Never);
+        self.objects.insert(object, Carried { client, begin, offset, motion, moved });
+        Ok(())
+    }
+
+    /// Moves an object within `steps` steps towards an offset from the pose at which the client lifted it.
+    ///
+    /// # Errors
+    /// This client does not carry it.
     pub(super) fn carry(
         &mut self,
         client: ClientId,
         object: Object,
-        (offset, over_s): ([f32; 3], f32),
-        (state, colliders): (&LoadedState<'_>, &[ColliderState]),
+        offset: [f32; 3],
+        steps: f64,
     ) -> Result<(), Refusal> {
-        let rate_hz = f64::from(state.load.header.rate_hz.max(1));
-        let mut target = offset.map(f64::from);
-        if state.load.summary.is_planar {
-            target[2] = 0.0;
-        }
-        let motion = Motion::Carried { target, steps_left: (f64::from(over_s) * rate_hz).max(1.0) };
-        if let Some(carried) = self.objects.get_mut(&object)
-            && matches!(carried.motion, Motion::Carried { .. })
-        {
-            if carried.client != client {
-                return Err(Reason::GrabbedByOther.into());
-            }
-            carried.begin(motion);
-            return Ok(());
-        }
-        let begin = pose(object, state, colliders)?;
-        self.objects.insert(
-            object,
-            Carried { client, begin, offset: [0.0; 3], motion, moved: Moved::Never },
-        );
+        let carried = self.find(client, object)?;
+        let target = offset.map(f64::from);
+        carried.begin(Motion::Towards { target, steps_left: steps.max(1.0) });
         Ok(())
     }
 
-    /// Ends the carrying of an object, which glides on with a velocity in m/s.
+    /// Releases an object, which glides on with a velocity in m/s. Without one, it still reaches its target.
     ///
     /// # Errors
     /// This client does not carry it.
@@ -102,22 +118,24 @@ impl Carrier {
         object: Object,
         velocity: [f32; 3],
     ) -> Result<(), Refusal> {
-        let carried = self
-            .objects
-            .get_mut(&object)
-            .filter(|one| one.client == client && matches!(one.motion, Motion::Carried { .. }));
-        let carried = carried.ok_or(Reason::NotGrabbed)?;
+        let carried = self.find(client, object)?;
+        carried.client = None;
         let velocity = velocity.map(f64::from);
-        carried.begin(Motion::Thrown { velocity, left_s: GLIDE_END_S });
-        if velocity == [0.0; 3] {
-            self.objects.remove(&object);
+        if velocity != [0.0; 3] {
+            carried.begin(Motion::Gliding { velocity, left_s: GLIDE_END_S });
         }
+        self.remove_resting();
         Ok(())
     }
 
-    /// Puts down what a client carries.
+    fn find(&mut self, client: ClientId, object: Object) -> Result<&mut Carried, Refusal> {
+        let carried = self.objects.get_mut(&object).filter(|one| one.client == Some(client));
+        carried.ok_or(Reason::NotGrabbed.into())
+    }
+
+    /// Leaves what a client carries where it is.
     pub(super) fn remove_client(&mut self, client: ClientId) {
-        self.objects.retain(|_, carried| carried.client != client);
+        self.objects.retain(|_, carried| carried.client != Some(client));
     }
 
     /// Forgets all objects: another state is in place.
@@ -133,27 +151,32 @@ impl Carrier {
     /// Returns the moves for the step after the newest state.
     pub(super) fn advance(&mut self, state: &LoadedState<'_>) -> Vec<Action> {
         let step = state.header.step;
-        let is_planar = state.load.summary.is_planar;
         let dt = 1.0 / f64::from(state.load.header.rate_hz.max(1));
         let mut moves = Vec::new();
         for (object, carried) in self.objects.iter_mut().filter(|(_, one)| one.is_moving()) {
             let passed = carried.pass(step);
             if passed > 0 {
                 carried.advance(passed as f64, dt);
-                moves.push(carried.action(*object, is_planar));
+                let pose = carried.pose();
+                let pose = if state.load.summary.is_planar { in_plane(pose) } else { pose };
+                moves.push(move_to(*object, pose));
             }
         }
-        self.objects
-            .retain(|_, one| matches!(one.motion, Motion::Carried { .. }) || one.is_moving());
+        self.remove_resting();
         moves
+    }
+
+    /// Forgets what nobody carries and nothing moves.
+    fn remove_resting(&mut self) {
+        self.objects.retain(|_, one| one.client.is_some() || one.is_moving());
     }
 }
 
 impl Carried {
     fn is_moving(&self) -> bool {
         match self.motion {
-            Motion::Carried { steps_left, .. } => steps_left > 0.0,
-            Motion::Thrown { left_s, .. } => left_s > 0.0,
+            Motion::Towards { steps_left, .. } => steps_left > 0.0,
+            Motion::Gliding { left_s, .. } => left_s > 0.0,
         }
     }
 
@@ -180,14 +203,14 @@ impl Carried {
     /// Moves it by a number of steps of `dt` seconds each.
     fn advance(&mut self, steps: f64, dt: f64) {
         match &mut self.motion {
-            Motion::Carried { target, steps_left } => {
+            Motion::Towards { target, steps_left } => {
                 let share = (steps / *steps_left).min(1.0);
                 for (offset, target) in self.offset.iter_mut().zip(target) {
                     *offset += (*target - *offset) * share;
                 }
                 *steps_left -= steps;
             }
-            Motion::Thrown { velocity, left_s } => {
+            Motion::Gliding { velocity, left_s } => {
                 let left = (-steps * dt / GLIDE_S).exp();
                 for (offset, velocity) in self.offset.iter_mut().zip(velocity) {
                     *offset += *velocity * GLIDE_S * (1.0 - left);
@@ -198,40 +221,46 @@ impl Carried {
         }
     }
 
-    fn action(&self, object: Object, is_planar: bool) -> Action {
-        let Pose { translation, mut rotation } = self.begin;
-        let mut translation: [f32; 3] =
-            std::array::from_fn(|axis| to_f32(f64::from(translation[axis]) + self.offset[axis]));
-        if is_planar {
-            // A pose must not leave the plane, not even by a rounding error.
-            (translation[2], rotation[0], rotation[1]) = (0.0, 0.0, 0.0);
-        }
-        match object {
-            Object::Collider(collider) => Action::MoveCollider { collider, translation, rotation },
-            Object::Anchor(anchor) => Action::MoveAnchor { anchor, translation, rotation },
-        }
+    fn pose(&self) -> Pose {
+        let Pose { translation, rotation } = self.begin;
+        let along = |axis: usize| to_f32(f64::from(translation[axis]) + self.offset[axis]);
+        Pose { translation: std::array::from_fn(along), rotation }
     }
 }
 
-/// Returns the present pose of an object, relative to that at load.
-fn pose(
-    object: Object,
-    state: &LoadedState<'_>,
-    colliders: &[ColliderState],
-) -> Result<Pose, Refusal> {
-    let poses = &state.load.summary.poses;
+/// Keeps a pose in the plane of a scene of two dimensions, which it must not leave by a rounding error.
+fn in_plane(pose: Pose) -> Pose {
+    let Pose { translation: [x, y, _], rotation: [_, _, z, w] } = pose;
+    Pose { translation: [x, y, 0.0], rotation: [0.0, 0.0, z, w] }
+}
+
+fn move_to(object: Object, Pose { translation, rotation }: Pose) -> Action {
     match object {
-        Object::Collider(index) => {
-            let fields = colliders.get(index as usize).and_then(fields);
-            let pose = fields.and_then(|fields| poses.collider(index, &fields));
-            pose.ok_or(Reason::UnknownCollider.into())
-        }
-        Object::Anchor(index) => {
-            let position = |particle: u32| {
-                let particle = state.particles.get(particle as usize)?;
-                (particle.flags & HELD == 0).then_some(particle.position)
-            };
-            poses.anchor(index, position).ok_or(Reason::UnknownAnchor.into())
+        Object::Collider(collider) => Action::MoveCollider { collider, translation, rotation },
+        Object::Anchor(anchor) => Action::MoveAnchor { anchor, translation, rotation },
+    }
+}
+
+impl Place<'_> {
+    /// Returns the present pose of an object, relative to that at load.
+    fn pose(&self, object: Object) -> Result<Pose, Refusal> {
+        let poses = &self.state.load.summary.poses;
+        match object {
+            Object::Collider(index) => {
+                let fields = self.colliders.get(index as usize).and_then(fields);
+                let pose = fields.and_then(|fields| poses.collider(index, &fields));
+                pose.ok_or(Reason::UnknownCollider.into())
+            }
+            Object::Anchor(index) if poses.anchored().nth(index as usize).is_none() => {
+                Err(Reason::UnknownAnchor.into())
+            }
+            Object::Anchor(index) => {
+                let position = |particle: u32| {
+                    let particle = self.state.particles.get(particle as usize)?;
+                    (particle.flags & NOT_DRIVEN == 0).then_some(particle.position)
+                };
+                poses.anchor(index, position).ok_or(Reason::GrabbedByOther.into())
+            }
         }
     }
 }
@@ -307,14 +336,13 @@ mod tests {
             }
         }
 
-        fn carry(
+        fn lift(
             &self,
             carrier: &mut Carrier,
             client: ClientId,
-            offset: [f32; 3],
-            over_s: f32,
+            object: Object,
         ) -> Result<(), Refusal> {
-            carrier.carry(client, BALL, (offset, over_s), (&self.state(), &self.colliders))
+            carrier.lift(client, object, Place { state: &self.state(), colliders: &self.colliders })
         }
 
         /// Makes the steps that follow, one by one, and returns the translation of each move.
@@ -342,27 +370,29 @@ mod tests {
         // The rate of the scene is 240 Hz, so the ball has risen by 1 m.
         let mut stage = Stage::new(SCENE, 120);
         let mut carrier = Carrier::default();
-        stage.carry(&mut carrier, ADA, [0.4, 0.0, 0.0], 0.04).unwrap();
+        stage.lift(&mut carrier, ADA, BALL).unwrap();
+        assert!(!carrier.is_moving());
+        carrier.carry(ADA, BALL, [0.4, 0.0, 0.0], 4.0).unwrap();
         let moves = stage.moves(&mut carrier, 6);
         let expected = [0.1, 0.2, 0.3, 0.4].map(|x| [x, 1.0, 0.0]);
         assert_eq!(moves.len(), 4, "{moves:?}");
         assert!(moves.iter().zip(expected).all(|(a, b)| near(*a, b)), "{moves:?}");
         assert!(!carrier.is_moving());
         // The next target is relative to the same beginning, and reached even if steps are missed.
-        stage.carry(&mut carrier, ADA, [0.4, -0.4, 0.0], 0.04).unwrap();
+        carrier.carry(ADA, BALL, [0.4, -0.4, 0.0], 4.0).unwrap();
         assert!(near(stage.moves(&mut carrier, 2)[1], [0.4, 0.8, 0.0]));
         stage.header.step += 1;
         assert!(near(stage.moves(&mut carrier, 1)[0], [0.4, 0.6, 0.0]));
         assert!(!carrier.is_moving());
         // However long it has rested, and however old the newest state is, the next motion begins with its first part.
-        stage.carry(&mut carrier, ADA, [0.0, -0.4, 0.0], 0.04).unwrap();
+        carrier.carry(ADA, BALL, [0.0, -0.4, 0.0], 4.0).unwrap();
         let at_once = carrier.advance(&stage.state());
         assert!(matches!(at_once[..], [Action::MoveCollider { .. }]), "{at_once:?}");
         assert!(carrier.advance(&stage.state()).is_empty());
         stage.header.step += 50;
         assert!(near(stage.moves(&mut carrier, 1)[0], [0.2, 0.6, 0.0]));
         // Without time it is there in the next step.
-        stage.carry(&mut carrier, ADA, [0.0, 0.0, 0.0], 0.0).unwrap();
+        carrier.carry(ADA, BALL, [0.0; 3], 0.0).unwrap();
         assert!(near(stage.moves(&mut carrier, 3)[0], [0.0, 1.0, 0.0]));
         // The same state again is no step.
         assert!(carrier.advance(&stage.state()).is_empty());
@@ -372,8 +402,7 @@ mod tests {
     fn a_thrown_object_slows_down_to_rest() {
         let mut stage = Stage::new(SCENE, 0);
         let mut carrier = Carrier::default();
-        stage.carry(&mut carrier, ADA, [0.0; 3], 0.0).unwrap();
-        stage.moves(&mut carrier, 1);
+        stage.lift(&mut carrier, ADA, BALL).unwrap();
         carrier.throw(ADA, BALL, [2.0, 0.0, -1.0]).unwrap();
         let moves = stage.moves(&mut carrier, 1000);
         let first = moves[0];
@@ -389,22 +418,59 @@ mod tests {
     }
 
     #[test]
+    fn an_object_that_is_put_down_still_reaches_its_target() {
+        let mut stage = Stage::new(SCENE, 0);
+        let mut carrier = Carrier::default();
+        stage.lift(&mut carrier, ADA, BALL).unwrap();
+        carrier.carry(ADA, BALL, [0.3, 0.0, 0.0], 3.0).unwrap();
+        carrier.throw(ADA, BALL, [0.0; 3]).unwrap();
+        let moves = stage.moves(&mut carrier, 9);
+        assert_eq!(moves.len(), 3, "{moves:?}");
+        assert!(near(moves[2], [0.3, 0.0, 0.0]), "{moves:?}");
+        assert!(carrier.objects.is_empty());
+        // Where it is already there, nothing is left to do.
+        stage.lift(&mut carrier, ADA, BALL).unwrap();
+        carrier.throw(ADA, BALL, [0.0; 3]).unwrap();
+        assert!(carrier.objects.is_empty());
+    }
+
+    #[test]
     fn only_one_client_carries_an_object() {
         let mut stage = Stage::new(SCENE, 0);
         let mut carrier = Carrier::default();
         let taken = Err(Refusal::Node(Reason::GrabbedByOther));
         let not_held = Err(Refusal::Node(Reason::NotGrabbed));
+        // A target of before a reset moves nothing.
+        assert_eq!(carrier.carry(ADA, BALL, [1.0; 3], 9.0), not_held);
         assert_eq!(carrier.throw(ADA, BALL, [0.0; 3]), not_held);
-        stage.carry(&mut carrier, ADA, [1.0; 3], 0.1).unwrap();
-        assert_eq!(stage.carry(&mut carrier, BEN, [1.0; 3], 0.1), taken);
+        stage.lift(&mut carrier, ADA, BALL).unwrap();
+        assert_eq!(stage.lift(&mut carrier, BEN, BALL), taken);
+        assert_eq!(carrier.carry(BEN, BALL, [1.0; 3], 9.0), not_held);
         assert_eq!(carrier.throw(BEN, BALL, [0.0; 3]), not_held);
-        // A thrown object belongs to nobody.
+        // A thrown object belongs to nobody, and glides on without the client.
         carrier.throw(ADA, BALL, [1.0; 3]).unwrap();
-        stage.carry(&mut carrier, BEN, [1.0; 3], 0.1).unwrap();
+        carrier.remove_client(ADA);
+        assert!(carrier.is_moving());
+        stage.lift(&mut carrier, BEN, BALL).unwrap();
         assert_eq!(carrier.throw(ADA, BALL, [0.0; 3]), not_held);
+        carrier.carry(BEN, BALL, [1.0; 3], 9.0).unwrap();
         carrier.remove_client(BEN);
-        assert!(!carrier.is_moving());
         assert_eq!(stage.moves(&mut carrier, 3), Vec::<[f32; 3]>::new());
+    }
+
+    #[test]
+    fn the_number_of_objects_is_limited() {
+        let collider = "[[collider]]\nshape = 'sphere'\ncenter = [0, 0, 0]\nradius = 1\n";
+        let stage = Stage::new(&(SCENE.to_owned() + "\n" + &collider.repeat(CARRIED_MAX)), 0);
+        let mut carrier = Carrier::default();
+        let mut lift = |index: usize| {
+            stage.lift(&mut carrier, ADA, Object::Collider(u32::try_from(index).unwrap()))
+        };
+        for index in 0..CARRIED_MAX {
+            lift(index).unwrap();
+        }
+        assert_eq!(lift(CARRIED_MAX), Err(Refusal::Busy));
+        assert_eq!(lift(0), Ok(()));
     }
 
     #[test]
@@ -412,25 +478,25 @@ mod tests {
         let mut stage = Stage::new(SCENE, 0);
         stage.particles[0].position = [0.0, 3.0, 0.5];
         let mut carrier = Carrier::default();
-        let (anchor, place) = (Object::Anchor(0), (&stage.state(), &*stage.colliders));
-        carrier.carry(ADA, anchor, ([0.25, 0.0, 0.0], 0.0), place).unwrap();
-        let unknown = Err(Refusal::Node(Reason::UnknownAnchor));
-        assert_eq!(carrier.carry(ADA, Object::Anchor(1), ([0.0; 3], 0.0), place), unknown);
-        // What a client grabs is not where its anchor is.
-        let mut grabbed = Stage::new(SCENE, 0);
-        grabbed.particles[0].flags = ParticleFlags::GRABBED;
-        let place = (&grabbed.state(), &*grabbed.colliders);
-        assert_eq!(Carrier::default().carry(BEN, anchor, ([0.0; 3], 0.0), place), unknown);
-        let missing = Err(Refusal::Node(Reason::UnknownCollider));
-        assert_eq!(carrier.carry(ADA, Object::Collider(1), ([0.0; 3], 0.0), place), missing);
+        let anchor = Object::Anchor(0);
+        stage.lift(&mut carrier, ADA, anchor).unwrap();
+        carrier.carry(ADA, anchor, [0.25, 0.0, 0.0], 0.0).unwrap();
+        let refused = |object| stage.lift(&mut Carrier::default(), ADA, object).unwrap_err();
+        assert_eq!(refused(Object::Anchor(1)), Refusal::Node(Reason::UnknownAnchor));
+        assert_eq!(refused(Object::Collider(1)), Refusal::Node(Reason::UnknownCollider));
         assert!(near(stage.moves(&mut carrier, 1)[0], [0.25, 2.0, 0.5]));
+        // A grabbed particle does not show the pose of its anchor.
+        stage.particles[0].flags = ParticleFlags::GRABBED;
+        let taken = Err(Refusal::Node(Reason::GrabbedByOther));
+        assert_eq!(stage.lift(&mut Carrier::default(), BEN, anchor), taken);
     }
 
     #[test]
     fn a_planar_scene_stays_in_its_plane() {
         let mut stage = Stage::new(&SCENE.replace("version = 1", "version = 1\ndimensions = 2"), 0);
         let mut carrier = Carrier::default();
-        stage.carry(&mut carrier, ADA, [1.0, 0.0, 5.0], 0.0).unwrap();
+        stage.lift(&mut carrier, ADA, BALL).unwrap();
+        carrier.carry(ADA, BALL, [1.0, 0.0, 5.0], 0.0).unwrap();
         assert_eq!(stage.moves(&mut carrier, 1), [[1.0, 0.0, 0.0]]);
         carrier.throw(ADA, BALL, [1.0, 0.0, 5.0]).unwrap();
         assert!(stage.moves(&mut carrier, 9).iter().all(|at| at[2] == 0.0));

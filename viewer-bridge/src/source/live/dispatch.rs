@@ -103,9 +103,15 @@ impl Dispatch {
         }
     }
 
-    /// Sends actions for the bridge itself, without an answer to a client.
-    pub(super) fn add(&mut self, actions: Vec<Action>) {
-        self.outbox.extend(actions.into_iter().map(|action| Part { command: None, action }));
+    /// Sends moves for the bridge itself, without an answer to a client. Each replaces an unsent one of the same
+    /// object.
+    pub(super) fn add_moves(&mut self, moves: Vec<Action>) {
+        for action in moves {
+            let is_outdated =
+                |part: &Part| part.command.is_none() && is_same_object(&part.action, &action);
+            self.outbox.retain(|part| !is_outdated(part));
+            self.outbox.push_back(Part { command: None, action });
+        }
     }
 
     fn open_command(&mut self, client: ClientId, outcome: OutcomeText, parts: Vec<Action>) {
@@ -349,6 +355,14 @@ impl OpenCommand {
         if self.outcome.id.is_some() || self.outcome.status != Status::Applied {
             sinks.publish(&Update::Answer { client: self.client, outcome: &self.outcome });
         }
+    }
+}
+
+fn is_same_object(a: &Action, b: &Action) -> bool {
+    match (a, b) {
+        (Action::MoveCollider { collider: a, .. }, Action::MoveCollider { collider: b, .. })
+        | (Action::MoveAnchor { anchor: a, .. }, Action::MoveAnchor { anchor: b, .. }) => a == b,
+        _ => false,
     }
 }
 

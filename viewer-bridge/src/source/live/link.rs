@@ -3,17 +3,18 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use recorder::{OutcomeRow, StatusRow, StepRow};
+use recorder::{StatusRow, StepRow};
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{
-    Action, AttachError, Client, Endpoint, NodeStatus, Outcome, ParameterValues, SnapshotFlags, Tap,
+    AttachError, Client, Endpoint, NodeStatus, ParameterValues, SnapshotFlags, Tap,
 };
 
-use super::carrier::Carrier;
+use super::carrier::{Carrier, Place};
 use super::command_context::CommandContext;
 use super::dispatch::Dispatch;
 use super::newest_state::{LoadedState, NewestState};
 use super::node_text::node_text;
+use super::outcomes::{HeldByClients, handle_outcomes};
 use super::statistics::statistics;
 use super::undo::kept_state::Keyframes;
 use super::undo::stack::Change;
@@ -146,12 +147,12 @@ impl Link {
         self.check_owner(now_ns)
     }
 
-    /// Sends what is carried to its place in the next step.
+    /// Sends the poses of carried objects for the next step.
     pub(super) fn move_carried(&mut self, sinks: &Sinks) {
         let Some(state) = self.newest.get() else { return };
         let moves = self.carrier.advance(&state);
         if !moves.is_empty() {
-            self.dispatch.add(moves);
+            self.dispatch.add_moves(moves);
             self.dispatch.flush(&mut self.client, sinks);
         }
     }
@@ -225,6 +226,7 @@ impl Link {
                 self.undo.remove_client(client);
             }
             RequestKind::Command { id, command: Command::Undo { takes_others } } => {
+                self.carrier.clear();
                 let request = UndoRequest { client, id, takes_others };
                 let answer = self.undo.begin(request, self.newest.get(), &mut self.client);
                 if let Some(outcome) = answer {
@@ -233,7 +235,8 @@ impl Link {
             }
             RequestKind::Command {
                 id,
-                command: command @ (Command::Carry { .. } | Command::Throw { .. }),
+                command:
+                    command @ (Command::Lift { .. } | Command::Carry { .. } | Command::Throw { .. }),
             } => {
                 let outcome = match self.carry(client, &command, shown) {
                     Ok(()) => OutcomeText::applied(id, command.name()),
@@ -263,9 +266,20 @@ impl Link {
         }
         let state = self.newest.get().ok_or(Refusal::NoNode)?;
         match *command {
+            Command::Lift { epoch, .. } if epoch != shown.epoch() => Err(Refusal::StaleEpoch),
+            Command::Lift { object, index, .. } => {
+                let place = Place { state: &state, colliders: shown.colliders() };
+                let object = object.at(index);
+                self.carrier.lift(client, object, place)?;
+                // To others, the whole way is one change.
+                let change =
+                    Change { step: state.header.step, client: Some(client), command: None };
+                self.undo.add_carrying(change);
+                Ok(())
+            }
             Command::Carry { object, index, offset, over_s } => {
-                let place = (&state, shown.colliders());
-                self.carrier.carry(client, object.at(index), (offset, over_s), place)
+                let steps = f64::from(over_s) * f64::from(state.load.header.rate_hz.max(1));
+                self.carrier.carry(client, object.at(index), offset, steps)
             }
             Command::Throw { object, index, velocity } => {
                 self.carrier.throw(client, object.at(index), velocity)
@@ -282,6 +296,10 @@ impl Link {
         shown: &ShownState,
         sinks: &Sinks,
     ) {
+        if matches!(command, Command::Reset {} | Command::Load { .. } | Command::Rewind { .. }) {
+            // No move may follow it in the node's queue.
+            self.carrier.clear();
+        }
         let state = self.newest.get();
         let context = CommandContext {
             epoch: shown.epoch(),
@@ -311,7 +329,11 @@ impl Link {
         // A client that waits for an answer sees the effect of its command after the answer. The last
         // answers of a run arrive together with the first messages of the next one.
         handle_outcomes(
-            (&mut self.dispatch, &mut self.carrier, &mut self.undo),
+            HeldByClients {
+                dispatch: &mut self.dispatch,
+                carrier: &mut self.carrier,
+                undo: &mut self.undo,
+            },
             &mut self.client,
             self.newest.get(),
             &updates.outcomes,
@@ -411,7 +433,11 @@ impl Link {
             let mut updates = Updates::for_run(self.run_id);
             self.tap.latest_state(|update| updates.add(update));
             handle_outcomes(
-                (&mut self.dispatch, &mut self.carrier, &mut self.undo),
+                HeldByClients {
+                    dispatch: &mut self.dispatch,
+                    carrier: &mut self.carrier,
+                    undo: &mut self.undo,
+                },
                 &mut self.client,
                 None,
                 &updates.outcomes,
@@ -433,66 +459,4 @@ fn check_run(known: &mut Option<u64>, run_id: Option<u64>) -> Result<(), LinkEnd
         Some(known) if known != run_id => Err(LinkEnd::NewRun),
         _ => Ok(()),
     }
-}
-
-/// Ends the grabs of clients at an applied action that replaces the state.
-fn end_grabs(dispatch: &mut Dispatch, action: &Action) {
-    match action {
-        Action::Reset | Action::Load { .. } => dispatch.end_applied_grabs(),
-        // The state in place may have them too, and then the node still drives the particles.
-        Action::Rewind { .. } | Action::Restore { .. } => dispatch.release_applied_grabs(),
-        _ => {}
-    }
-}
-
-/// Notes what a client of the bridge, or another program, has changed.
-fn note_change(dispatch: &Dispatch, undo: &mut Undo, outcome: &Outcome, is_own: bool) {
-    let origin = dispatch.origin(outcome.command.sequence).filter(|_| is_own);
-    // The bridge ends the grabs of clients that have left.
-    if is_own && origin.is_none() {
-        return;
-    }
-    let client = origin.and_then(|origin| origin.client);
-    let command = origin.map(|origin| origin.command);
-    undo.add(Change { step: outcome.step, client, command }, &outcome.command.action());
-}
-
-/// Publishes outcomes, and answers the clients whose commands they belong to.
-fn handle_outcomes(
-    (dispatch, carrier, undo): (&mut Dispatch, &mut Carrier, &mut Undo),
-    client: &mut Client,
-    newest: Option<LoadedState<'_>>,
-    outcomes: &[Outcome],
-    sinks: &Sinks,
-) {
-    for outcome in outcomes {
-        sinks.publish(&Update::Outcome(&OutcomeRow::from(outcome)));
-        let action = outcome.command.action();
-        if outcome.is_applied() {
-            end_grabs(dispatch, &action);
-            if OutcomeRow::from(outcome).replaces_state() || matches!(action, Action::Load { .. }) {
-                carrier.clear();
-            }
-            if OutcomeRow::from(outcome).replaces_state() {
-                sinks.publish(&Update::Reset { step: outcome.step });
-            }
-        }
-        if let Action::Release { particle, force: true } = action
-            && outcome.is_applied()
-        {
-            dispatch.end_applied_grab(particle);
-        }
-        let is_own = outcome.command.client_id == client.client_id();
-        if is_own && undo.on_outcome(outcome, newest, client, sinks) {
-            continue;
-        }
-        if outcome.is_applied() {
-            note_change(dispatch, undo, outcome, is_own);
-        }
-        if is_own {
-            dispatch.on_outcome(sinks, outcome);
-        }
-    }
-    // The client receives the same outcomes. Reading them makes room for the next ones.
-    while let Ok(Some(_)) = client.next_outcome(Duration::ZERO) {}
 }

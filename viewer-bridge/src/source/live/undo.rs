@@ -105,6 +105,11 @@ impl Undo {
         }
     }
 
+    /// Notes that a client carries something.
+    pub(super) fn add_carrying(&mut self, change: Change) {
+        self.stack.add(change);
+    }
+
     /// Begins to undo the newest change of a page. Returns the answer if it is refused.
     pub(super) fn begin(
         &mut self,

@@ -1,8 +1,7 @@
 // Carrying: moves a collider or an anchor along with the pointer, and lets it go with the velocity of the pointer.
 
 import { subtract } from "../geometry/math.js";
-import { DragTool } from "./drag.js";
-import { OVER_S } from "./tool.js";
+import { PressTool } from "./press-tool.js";
 
 /** @typedef {import("../geometry/math.js").Vec3} Vec3 */
 /** @typedef {import("../geometry/pick.js").Pixel} Pixel */
@@ -12,7 +11,7 @@ import { OVER_S } from "./tool.js";
  * @typedef {{ object: "collider" | "anchor", index: number, point: Vec3, particle: number | null }} Load */
 
 /** @implements {Tool} */
-export class CarryTool extends DragTool {
+export class CarryTool extends PressTool {
   /** @param {App} app @param {Pixel} start @param {Load} load */
   constructor(app, start, { object, index, point, particle }) {
     super(app, start, point, particle);
@@ -21,13 +20,14 @@ export class CarryTool extends DragTool {
     this.from = this.targetAt(start);
   }
 
-  take() {
-    this.app.commands.run("carry", { ...this.carried, offset: [0, 0, 0], over_s: OVER_S.min }, ({ status }) => { this.isRefused = status === "rejected"; });
+  request() {
+    const { simulation, commands } = this.app;
+    commands.run("lift", { epoch: simulation.scene?.epoch ?? 0, ...this.carried }, ({ status }) => { this.isRefused = status === "rejected"; });
   }
 
   /** @param {Vec3} target @param {number} over_s */
   send(target, over_s) {
-    // It would be refused again in every frame, or begin at a distance once the other client releases it.
+    // It would be refused again in every frame.
     if (!this.isRefused) this.app.commands.stream("carry", { ...this.carried, offset: subtract(target, this.from), over_s });
   }
 

@@ -1,7 +1,7 @@
 // The grab: drives one particle to the pointer, and releases it with the velocity of the pointer.
 
 import { addScaled, length } from "../geometry/math.js";
-import { DragTool } from "./drag.js";
+import { PressTool } from "./press-tool.js";
 import { OVER_S } from "./tool.js";
 
 /** @typedef {import("../geometry/math.js").Vec3} Vec3 */
@@ -10,14 +10,14 @@ import { OVER_S } from "./tool.js";
 /** @typedef {import("./tool.js").Tool} Tool */
 
 /** Grabs a particle. Its target is where the pointer meets the camera-facing plane through it. @implements {Tool} */
-export class GrabTool extends DragTool {
+export class GrabTool extends PressTool {
   /** @param {App} app @param {number} particle @param {Pixel} start */
   constructor(app, particle, start) {
     super(app, start, /** @type {Vec3} */ (app.simulation.position(particle)), particle);
     this.grabbed = particle;
   }
 
-  take() {
+  request() {
     const { simulation, commands } = this.app;
     const target = simulation.position(this.grabbed) ?? this.targetAt(this.start);
     this.setOrigin(target);

@@ -4,7 +4,7 @@ import { clamp, length, subtract } from "../geometry/math.js";
 import { BrushTool } from "./brush.js";
 import { CarryTool } from "./carry.js";
 import { CutTool } from "./cut.js";
-import { CLICK_PIXELS, DragTool } from "./drag.js";
+import { CLICK_PIXELS, PressTool } from "./press-tool.js";
 import { GrabTool } from "./grab.js";
 import { anchorOf, solidAt } from "./objects.js";
 import { togglePin } from "./pin.js";
@@ -94,9 +94,9 @@ export class Input {
     }
     this.tool = this.begin(event, at);
     const isView = this.tool instanceof ViewTool;
-    this.click = event.button === 0 && (isView || this.tool instanceof DragTool) && (this.mode === "grab" || !this.canChange()) ? at : null;
+    this.click = event.button === 0 && (isView || this.tool instanceof PressTool) && (this.mode === "grab" || !this.canChange()) ? at : null;
     if (!isView) this.onTouch();
-    if (event.pointerType === "touch" && this.tool instanceof DragTool) this.waitForLongPress(this.tool);
+    if (event.pointerType === "touch" && this.tool instanceof PressTool) this.waitForLongPress(this.tool);
     this.app.renderer.isDirty = true;
   }
 
@@ -110,18 +110,18 @@ export class Input {
     if (event.button === 2 || this.mode === "cut") return new CutTool(app, at);
     if (this.mode === "brush") return depthUnder(app, at, this.brushRadius) === null ? new ViewTool(app, at, "orbit") : new BrushTool(app, at, this.brushRadius);
     const particle = particleAt(app, at, reach);
-    if (this.mode === "grab") return dragAt(app, at, particle) ?? new ViewTool(app, at, "orbit");
+    if (this.mode === "grab") return pressToolAt(app, at, particle) ?? new ViewTool(app, at, "orbit");
     if (particle === null) return new ViewTool(app, at, "orbit");
     togglePin(app, particle);
     return null;
   }
 
-  /** @param {DragTool & Tool} drag */
-  waitForLongPress(drag) {
-    const { particle } = drag;
+  /** @param {PressTool & Tool} tool */
+  waitForLongPress(tool) {
+    const { particle } = tool;
     if (particle === null) return;
     this.longPress = setTimeout(() => {
-      if (this.tool !== drag || distance(drag.start, drag.pointer) > SLACK) return;
+      if (this.tool !== tool || distance(tool.start, tool.pointer) > SLACK) return;
       this.finish();
       togglePin(this.app, particle);
       navigator.vibrate?.(15);
@@ -156,7 +156,7 @@ export class Input {
   release(event) {
     if (!this.pointers.delete(event.pointerId)) return;
     clearTimeout(this.longPress);
-    const isHeld = this.tool instanceof DragTool && this.tool.isBegun;
+    const isHeld = this.tool instanceof PressTool && this.tool.isBegun;
     const click = event.type === "pointerup" && !isHeld ? this.click : null;
     this.click = null;
     this.finish();
@@ -216,7 +216,7 @@ export class Input {
 
   /** Toggles the pin of the particle that is dragged, or of the one under the mouse. Returns false if there is none. */
   pinHovered() {
-    if (this.tool instanceof DragTool && this.tool.particle !== null) {
+    if (this.tool instanceof PressTool && this.tool.particle !== null) {
       togglePin(this.app, this.tool.particle);
       return true;
     }
@@ -254,9 +254,9 @@ export class Input {
   }
 }
 
-/** The tool that moves what is pressed: an anchor by its particle, a particle, or a solid that hides it or is alone. Null on nothing of these.
+/** The tool that moves what is pressed: an anchor by its particle, a particle, or a solid if it hides the particle or no particle is near. Null otherwise.
  * @param {import("./tool.js").App} app @param {Pixel} at @param {number | null} particle @returns {CarryTool | GrabTool | null} */
-function dragAt(app, at, particle) {
+function pressToolAt(app, at, particle) {
   const point = particle === null ? null : app.simulation.position(particle);
   const solid = solidAt(app, at);
   if (particle === null || (solid !== null && point !== null && isBehind(app.camera, point, solid.point))) {

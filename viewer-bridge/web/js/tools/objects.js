@@ -18,13 +18,13 @@ const FLAT_RADII = 1000;
 /** The anchor that drives a particle. A pin comes before it. @param {import("../state/simulation.js").Simulation} simulation @param {number} particle */
 export function anchorOf({ scene, pins }, particle) {
   const flags = pins.get(particle) ?? 0;
-  if (scene === null || (flags & (PIN.anchored | PIN.pinned)) !== PIN.anchored) return null;
+  if (scene === null || (flags & (PIN.anchored | PIN.pinned | PIN.grabbed)) !== PIN.anchored) return null;
   const anchor = scene.anchors.findIndex((particles) => particles.includes(particle));
   return anchor === -1 ? null : anchor;
 }
 
 /**
- * The solid that is seen at a pixel, and the point of it. Planes and bounds hold the scene, so they are none.
+ * The solid that is seen at a pixel, and the point of it. Planes and bounds contain the scene, so they cannot be carried.
  * @param {App} app @param {import("../geometry/pick.js").Pixel} at @param {number} trianglesMax limit on the triangles of a mesh
  * @returns {{ index: number, point: Vec3 } | null}
  */
@@ -41,7 +41,7 @@ export function solidAt({ simulation, camera, renderer }, at, trianglesMax = Inf
     const distance = distanceTo(one, mesh, ray);
     if (distance < nearest) [nearest, index] = [distance, one.index];
   }
-  if (index === -1 || isHidden(simulation, ray, camera.isFlat ? Infinity : nearest)) return null;
+  if (index === -1 || isHidden(simulation, renderer.toggles.surface, ray, camera.isFlat ? Infinity : nearest)) return null;
   return { index, point: addScaled(ray.origin, ray.direction, nearest) };
 }
 
@@ -53,11 +53,11 @@ function distanceTo(one, mesh, ray) {
   return one.shape === "mesh" && mesh !== undefined ? hitMesh(ray, one.center, one.rotation, mesh.vertices, mesh.triangles) : Infinity;
 }
 
-/** True if the cloth or the floor lies before a distance. @param {import("../state/simulation.js").Simulation} simulation @param {Ray} ray @param {number} distance */
-function isHidden({ scene, frame, topology, ground }, ray, distance) {
+/** True if the cloth or the floor lies before a distance. @param {import("../state/simulation.js").Simulation} simulation @param {boolean} isSurfaceShown @param {Ray} ray @param {number} distance */
+function isHidden({ scene, frame, topology, ground }, isSurfaceShown, ray, distance) {
   if (ground !== null && hitPlane(ray, ground.normal, ground.offset) < distance) return true;
   if (scene === null || frame === null || topology === null) return false;
   // A torn triangle is drawn in pieces.
   const isShown = (/** @type {number} */ triangle) => !topology.isDead[triangle] || topology.split.has(triangle);
-  return hitTriangles(ray, frame, scene.triangles, isShown) < distance * (1 + CLOTH_DEPTH);
+  return isSurfaceShown && hitTriangles(ray, frame, scene.triangles, isShown) < distance * (1 + CLOTH_DEPTH);
 }

@@ -42,11 +42,11 @@ test("a drag on a solid carries it along with the pointer, once per frame", () =
     assert.deepEqual(page.sent, []);
     at(page, "pointermove", 20, 5);
     at(page, "pointermove", 40, 10);
-    assert.deepEqual(page.sent.map(({ id, ...rest }) => rest), [{ type: "carry", object: "collider", index: 7, offset: [0, 0, 0], over_s: 1 / 240 }]);
+    assert.deepEqual(page.sent.map(({ id, ...rest }) => rest), [{ type: "lift", epoch: 1, object: "collider", index: 7 }]);
     const { tool } = page.input;
     page.input.tick(tool.sentMs + 20);
     page.input.tick(tool.sentMs + 20);
-    assert.deepEqual(types(page), ["carry", "carry"], solid.shape);
+    assert.deepEqual(types(page), ["lift", "carry"], solid.shape);
     const { over_s, offset, ...rest } = page.sent[1];
     assert.deepEqual(rest, { type: "carry", object: "collider", index: 7 });
     nearly([over_s, 0, 0], [0.02, 0, 0]);
@@ -100,7 +100,7 @@ test("a press that lasts carries, and a click on a solid sends nothing", () => {
   at(page, "pointerdown");
   page.input.tick(page.input.tool.pressedMs + 250);
   at(page, "pointerup");
-  assert.deepEqual(types(page), ["carry", "throw"]);
+  assert.deepEqual(types(page), ["lift", "throw"]);
   assert.deepEqual(page.sent[1].velocity, [0, 0, 0]);
 });
 
@@ -110,14 +110,14 @@ test("another scene, a reset and a lost connection end the carrying", () => {
     at(page, "pointerdown");
     at(page, "pointermove", 50);
     change(page);
-    assert.deepEqual(types(page), ["carry", "throw"]);
+    assert.deepEqual(types(page), ["lift", "throw"]);
     assert.deepEqual([page.sent[1].velocity, page.input.tool], [[0, 0, 0], null]);
   }
   const page = shown([SPHERE]);
   at(page, "pointerdown");
   at(page, "pointermove", 50);
   page.input.abandon();
-  assert.deepEqual(types(page), ["carry"]);
+  assert.deepEqual(types(page), ["lift"]);
 });
 
 test("nothing more is sent for an object that another page carries", () => {
@@ -127,7 +127,7 @@ test("nothing more is sent for an object that another page carries", () => {
   page.commands.receive({ type: "outcome", id: page.sent[0].id, status: "rejected", reason: "grabbed_by_other" });
   page.input.tick(performance.now());
   at(page, "pointerup", 50);
-  assert.deepEqual(types(page), ["carry"]);
+  assert.deepEqual(types(page), ["lift"]);
 });
 
 test("planes and bounds are not carried, and dragging them turns the view", () => {
@@ -198,7 +198,7 @@ test("a drag on an anchored particle carries its anchor, without a jump", () => 
   at(page, "pointerdown", 6);
   at(page, "pointermove", 6, 40);
   page.input.tick(performance.now());
-  assert.deepEqual(page.sent.map(({ type, object, index }) => [type, object, index]), [["carry", "anchor", 1], ["carry", "anchor", 1]]);
+  assert.deepEqual(page.sent.map(({ type, object, index }) => [type, object, index]), [["lift", "anchor", 1], ["carry", "anchor", 1]]);
   nearly(page.sent[1].offset, scale(page.camera.basis().up, -40 * page.camera.unitsPerPixel([0, 0, 0], VIEWPORT)), 1e-6);
   assert.deepEqual(page.input.tool.describe().line.particle, 0);
   at(page, "pointerup", 6, 40);

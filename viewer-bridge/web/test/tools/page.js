@@ -31,7 +31,7 @@ export function pageOf(scene, canChange = true) {
   const simulation = new Simulation();
   const camera = new Camera();
   if (scene.isPlanar) Object.assign(camera, { isFlat: true, axes: sceneAxes("y", 2) });
-  const app = { simulation, camera, renderer: { viewport: VIEWPORT, isDirty: false }, commands, selection: new Selection(simulation) };
+  const app = { simulation, camera, renderer: { viewport: VIEWPORT, isDirty: false, toggles: { surface: true } }, commands, selection: new Selection(simulation) };
   const input = new Input(canvas, app, () => canChange);
   simulation.receive(scene);
   simulation.receive({

@@ -17,7 +17,7 @@ export const CLICK_PIXELS = 3;
 const CLICK_MS = 200;
 
 /** Sends a target per animation frame with motion: where the pointer meets the camera-facing plane through a point. */
-export class DragTool {
+export class PressTool {
   /** @param {App} app @param {Pixel} start @param {Vec3} origin point of the plane @param {number | null} particle that was pressed */
   constructor(app, start, origin, particle) {
     this.app = app;
@@ -39,11 +39,11 @@ export class DragTool {
   begin() {
     if (this.isBegun) return;
     this.isBegun = true;
-    this.take();
+    this.request();
   }
 
   /** Asks the node for the motion. */
-  take() {}
+  request() {}
 
   /** Sends a target. @param {Vec3} _target @param {number} _over_s */
   send(_target, _over_s) {}
