@@ -40,7 +40,8 @@ pub const RELIABLE_QUEUED_MAX: usize = 256;
 /// Messages that wait for one Foxglove client. A new message replaces the oldest: a longer queue
 /// would only deliver older states to a slow client.
 pub const FOXGLOVE_QUEUED_MAX: usize = 8;
-/// Recordings of one bridge that are open at a time: each has two threads and parts of a file in memory.
+/// Recordings of one bridge that are open at a time: each has up to three threads, and parts of two files
+/// in memory.
 pub const REPLAYS_MAX: usize = 4;
 /// Requests of all clients that wait for the source.
 pub const REQUESTS_QUEUED_MAX: usize = 4096;

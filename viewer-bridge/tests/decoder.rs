@@ -11,8 +11,19 @@ use viewer_bridge::message::{Command, FromPage, check};
 use viewer_bridge::parse_published_command;
 
 /// Fields with coordinates, whose absolute values are limited.
-const COORDINATES: [&str; 10] =
-    ["target", "eye", "ray", "delta", "from", "to", "direction", "center", "translation", "offset"];
+const COORDINATES: [&str; 11] = [
+    "target",
+    "eye",
+    "ray",
+    "delta",
+    "from",
+    "to",
+    "direction",
+    "center",
+    "translation",
+    "offset",
+    "velocity",
+];
 /// Fields whose vectors need a direction.
 const DIRECTIONS: [&str; 3] = ["ray", "direction", "rotation"];
 /// Text that is hard to decode, beside valid values.

@@ -281,3 +281,51 @@ fn another_recording_is_drawn_as_a_ghost_where_its_particles_are() {
     tab.wait("!document.querySelector('#hud').textContent.includes('ghost')");
     assert_eq!(ghost_pixels(), 0);
 }
+
+/// A stick that a box hides from the eye, and one beside it.
+const HIDDEN_STICK: &str = "
+version = 1
+gravity = [0, 0, 0]
+[[particle]]
+position = [-0.2, 0, -1]
+[[particle]]
+position = [0.2, 0, -1]
+[[particle]]
+position = [0.8, 0, -1]
+[[particle]]
+position = [1.2, 0, -1]
+[[constraint]]
+particles = [0, 1]
+[[constraint]]
+particles = [2, 3]
+[[collider]]
+shape = 'box'
+center = [0, 0, 0]
+half_extents = [0.4, 0.4, 0.1]
+";
+
+#[test]
+#[ignore = "needs Chromium"]
+fn a_ghost_is_faint_behind_a_solid() {
+    let sandbox = Sandbox::new();
+    let scene = sandbox.write("hidden.toml", HIDDEN_STICK);
+    let folder = sandbox.path("runs");
+    std::fs::create_dir(&folder).unwrap();
+    for name in ["other", "shown"] {
+        let file = format!("{folder}/{name}.mcap");
+        let args = ["simulate", &scene, "--steps", "2", "-o", &file];
+        Process::run(Program::Recorder, &sandbox, &args).success();
+    }
+    let replay =
+        ReplayRig::open(sandbox, &folder, "camera=0,0,0,4,0,0&show.particles=0&show.sticks=0");
+    let tab = &replay.tab;
+    tab.wait("document.querySelector('#file').value === 'shown' && viewer.frame >= 0");
+    tab.evaluate("void (ghost => { ghost.value = 'other'; ghost.dispatchEvent(new Event('change')); })(document.querySelector('#ghost'))");
+    tab.wait("document.querySelector('#hud').textContent.includes('ghost at the same place')");
+    let pixels = |x: f32| {
+        let area = Area::around(tab.camera().project([x, 0.0, -1.0]), 10.0);
+        tab.drawn(area).count(&area, is_ghost)
+    };
+    assert!(pixels(1.0) > 10, "{} pixels beside the box", pixels(1.0));
+    assert_eq!(pixels(0.0), 0, "behind the box");
+}

@@ -102,7 +102,8 @@ fn a_ghost_has_the_states_of_the_other_recording_and_the_first_difference() {
     assert_eq!(ghost["first_different_step"], first);
     let text = ghost["text"].as_str().unwrap();
     assert!(text.starts_with(&format!("changed differs from step {first} (0.")), "{text}");
-    for step in [0, first - 1, first, 199, 201, 350, STEPS, 7, 300] {
+    // A paused replay shows the step on show only once, so the first seek goes elsewhere.
+    for step in [first, 0, first - 1, 199, 201, 350, STEPS, 7, 300] {
         let index = usize::try_from(step).unwrap();
         let (at_shown, at_other) = (&shown_states[index], &other_states[index]);
         let ghost = seek(&mut page, step).unwrap();

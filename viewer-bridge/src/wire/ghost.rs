@@ -16,7 +16,7 @@ pub struct Ghost {
     pub farthest: u32,
     /// Its distance in m; not a number if the two states have different steps.
     pub distance: f32,
-    /// Positions. Shape: particle count. Zeros for one that is not finite.
+    /// Positions. Shape: particle count. Not numbers for one that is not finite.
     pub positions: Vec<[f32; 3]>,
     /// Constraints that the ghost does not have: they are torn, or an end has no finite position.
     pub hidden: Vec<u32>,

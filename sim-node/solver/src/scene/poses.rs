@@ -10,7 +10,7 @@ use super::definition::collider::ColliderGeometry;
 use crate::frame::Pose;
 use sim_types::ColliderFields;
 
-/// Shortest distance between particles that tells a rotation, in parts of their distance from the origin.
+/// Shortest distance between particles from which a rotation is computed, relative to that from the origin.
 const ARM_MIN: f64 = 1e-6;
 
 /// The colliders and anchors of a scene at load.
@@ -58,7 +58,7 @@ impl ScenePoses {
         self.anchors.iter().map(|anchor| anchor.particles.iter().map(|(one, _)| *one).collect())
     }
 
-    /// Returns the pose of a collider that a node publishes. Sets no turn about an axis of symmetry. `None` if
+    /// Returns the pose of a collider that a node publishes. Leaves out the rotation about an axis of symmetry. `None` if
     /// the scene has no such collider.
     pub fn collider(&self, index: u32, now: &ColliderFields) -> Option<Pose> {
         let (from, to) = (center(&self.colliders.get(index as usize)?.fields()), center(now));
@@ -77,8 +77,8 @@ impl ScenePoses {
     }
 
     /// Returns the pose of an anchor whose particles are at `position`, which is `None` for a particle that
-    /// something else holds. It has no turn about the line of particles that lie on one. `None` if the scene has no
-    /// such anchor, or it drives no particle.
+    /// something else holds. If the particles lie on one line, the rotation about that line is unknown and left out.
+    /// `None` if the scene has no such anchor, or it drives no particle.
     pub fn anchor(&self, index: u32, position: impl Fn(u32) -> Option<[f32; 3]>) -> Option<Pose> {
         let AnchorAtLoad { origin, particles } = self.anchors.get(index as usize)?;
         let placed = particles.iter().filter_map(|(particle, at_load)| {

@@ -12,7 +12,7 @@ use super::undo::Undo;
 use super::undo::stack::Change;
 use crate::sink::{Sinks, Update};
 
-/// What the bridge keeps for its clients.
+/// The state that the bridge keeps for its clients.
 #[derive(Debug)]
 pub(super) struct HeldByClients<'a> {
     pub(super) dispatch: &'a mut Dispatch,

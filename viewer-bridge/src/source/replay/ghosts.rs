@@ -5,11 +5,12 @@
 mod comparison;
 mod job;
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, channel};
-use std::thread;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread::{self, JoinHandle};
 
 use recorder::verification::distance;
 use recorder::{ReadError, Tape, TapeError, TapeState};
@@ -52,6 +53,9 @@ pub(super) struct Ghosts {
     stop: Stop,
     text: GhostText,
     chosen: Option<Chosen>,
+    /// The thread of the last ghost. The next one begins when it has ended.
+    thread: Option<JoinHandle<()>>,
+    waiting: Option<(Job, Sender<Report>)>,
 }
 
 /// A ghost that has been chosen. Dropping it ends its thread.
@@ -74,7 +78,7 @@ impl Drop for Chosen {
 impl Ghosts {
     pub(super) fn new(choice: GhostChoice, stop: Stop) -> Self {
         let text = GhostText { given: choice.given_name(), ..GhostText::default() };
-        Self { choice, stop, text, chosen: None }
+        Self { choice, stop, text, chosen: None, thread: None, waiting: None }
     }
 
     /// Chooses the recording of the command line, if there is one.
@@ -91,7 +95,7 @@ impl Ghosts {
         recording: &Recording,
     ) -> Result<(), Refusal> {
         let Some(name) = name else {
-            self.chosen = None;
+            (self.chosen, self.waiting) = (None, None);
             self.text = GhostText { given: self.text.given.take(), ..GhostText::default() };
             return Ok(());
         };
@@ -104,7 +108,7 @@ impl Ghosts {
         let (sender, reports) = channel();
         let is_cancelled = Arc::new(AtomicBool::new(false));
         let job = Job {
-            shown: Shown::of(recording),
+            shown: Shown::from_recording(recording),
             name: name_of(&path).unwrap_or_default(),
             path,
             stop: self.stop.clone(),
@@ -117,13 +121,27 @@ impl Ghosts {
             text: format!("opening {}", job.name),
             first_different_step: None,
         };
-        let started =
-            thread::Builder::new().name("ghost".to_owned()).spawn(move || job.run(&sender));
-        if let Err(error) = started {
-            self.text.state = GhostState::Failed;
-            self.text.text = format!("cannot start the thread that opens it: {error}");
-        }
+        // Dropping the last ghost ends its thread.
         self.chosen = Some(Chosen { reports, is_cancelled, tape: None, read: None });
+        self.waiting = Some((job, sender));
+        self.start_waiting();
+    }
+
+    /// Starts the thread of the chosen ghost once that of the last one has ended: there is one at a time, however
+    /// fast pages choose.
+    fn start_waiting(&mut self) {
+        if self.thread.as_ref().is_some_and(|thread| !thread.is_finished()) {
+            return;
+        }
+        let Some((job, sender)) = self.waiting.take() else { return };
+        let builder = thread::Builder::new().name("ghost".to_owned());
+        match builder.spawn(move || job.run(&sender)) {
+            Ok(thread) => self.thread = Some(thread),
+            Err(error) => {
+                self.text.state = GhostState::Failed;
+                self.text.text = format!("cannot start the thread that opens it: {error}");
+            }
+        }
     }
 
     pub(super) fn text(&self) -> &GhostText {
@@ -132,6 +150,7 @@ impl Ghosts {
 
     /// Takes the reports of the thread. Returns whether there were any.
     pub(super) fn update(&mut self) -> bool {
+        self.start_waiting();
         let Some(chosen) = &mut self.chosen else { return false };
         let mut has_changed = false;
         for report in chosen.reports.try_iter() {
@@ -148,7 +167,13 @@ impl Ghosts {
         has_changed
     }
 
-    /// Reads the ghost of a state, if one is chosen. Returns whether it is another one than before.
+    /// Returns the read errors of the ghost since the last call, as text for users.
+    pub(super) fn drain_faults(&mut self) -> Vec<String> {
+        let tape = self.chosen.as_mut().and_then(|chosen| chosen.tape.as_mut());
+        tape.map(|tape| tape.drain_faults()).unwrap_or_default()
+    }
+
+    /// Reads the ghost of a state, if one is chosen. Returns whether the ghost has changed.
     ///
     /// # Errors
     /// A signal has arrived.
@@ -193,7 +218,7 @@ fn to_ghost(ghost: &TapeState, shown: &TapeState, constraints: &[ConstraintState
         stamp: Stamp { epoch: 0, step: ghost.row.step },
         farthest,
         distance,
-        positions: particles.iter().map(|one| finite(one).unwrap_or_default()).collect(),
+        positions: particles.iter().map(|one| finite(one).unwrap_or([f32::NAN; 3])).collect(),
         hidden: hidden(ghost, constraints),
     }
 }
@@ -220,7 +245,10 @@ fn hidden(ghost: &TapeState, constraints: &[ConstraintState]) -> Vec<u32> {
     let particles = &ghost.particles;
     if particles.iter().any(|one| finite(one).is_none()) {
         let is_lost = |end: u32| particles.get(end as usize).and_then(finite).is_none();
-        let lost = (0..).zip(constraints).filter(|(_, one)| is_lost(one.a) || is_lost(one.b));
+        let torn: BTreeSet<u32> = hidden.iter().copied().collect();
+        let lost = (0..)
+            .zip(constraints)
+            .filter(|(index, one)| (is_lost(one.a) || is_lost(one.b)) && !torn.contains(index));
         hidden.extend(lost.map(|(index, _)| index));
     }
     hidden
@@ -261,9 +289,10 @@ mod tests {
         let constraint = |a, b| ConstraintState { a, b, ..ConstraintState::default() };
         let constraints = [constraint(0, 1), constraint(1, 2), constraint(0, 2)];
         let mut ghost = state(7, &[[0.0; 3], [0.0, f32::NAN, 0.0], [1.0; 3]]);
-        ghost.torn.extend(5, [(2, 0), (9, 0)].map(|(index, cause)| torn(index, cause)));
+        ghost.torn.extend(5, [(2, 0), (1, 0), (9, 0)].map(|(index, cause)| torn(index, cause)));
         let found = to_ghost(&ghost, &ghost, &constraints);
-        assert_eq!((found.hidden, found.positions[1]), (vec![2, 0, 1], [0.0; 3]));
+        assert_eq!(found.hidden, [2, 1, 0]);
+        assert!(found.positions[1].iter().all(|axis| axis.is_nan()));
     }
 
     fn torn(constraint: u32, cause: u32) -> sim_contract::TornConstraint {

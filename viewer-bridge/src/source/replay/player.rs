@@ -237,8 +237,17 @@ impl<'a> Player<'a> {
         if self.ghosts.read(&self.state, &self.recording.load.constraints)? {
             self.on_show = None;
         }
-        for fault in self.recording.tape.drain_faults() {
-            let text = &format!("{}: {fault}; it is skipped", self.recording.file);
+        let faults = self
+            .recording
+            .tape
+            .drain_faults()
+            .into_iter()
+            .map(|fault| (self.recording.file.as_str(), fault));
+        let ghost_faults = self.ghosts.drain_faults();
+        let ghost_name = self.ghosts.text().name.as_deref().unwrap_or_default();
+        for (file, fault) in faults.chain(ghost_faults.into_iter().map(|fault| (ghost_name, fault)))
+        {
+            let text = &format!("{file}: {fault}; it is skipped");
             self.sinks.publish(&Update::Notice { level: Level::Warning, text });
         }
         Ok(())

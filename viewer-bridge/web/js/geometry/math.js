@@ -114,3 +114,10 @@ export function boxOf(xyz) {
   }
   return { min, max };
 }
+
+/** True for equal lists of numbers. @param {ArrayLike<number>} a @param {ArrayLike<number>} b */
+export function sameNumbers(a, b) {
+  if (a.length !== b.length) return false;
+  for (let i = 0; i < a.length; i++) if (a[i] !== b[i]) return false;
+  return true;
+}

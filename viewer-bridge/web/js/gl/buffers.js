@@ -100,10 +100,10 @@ export class SceneBuffers {
     if (frame.particleCount > 0) this.positions.write(frame.positions);
   }
 
-  /** @param {import("../net/wire.js").Ghost} ghost */
-  writeGhost(ghost) {
+  /** @param {import("../net/wire.js").Ghost} ghost @param {() => Sticks} sticksOf returns the sticks for ghosts */
+  writeGhost(ghost, sticksOf) {
     if (ghost.positions.length !== 3 * this.scene.particleCount) return;
-    this.ghost ??= new GhostSticks(this.gl, this.topology, STICKS_MAX);
+    this.ghost ??= new GhostSticks(this.gl, sticksOf(), this.topology, STICKS_MAX);
     this.ghost.write(ghost);
   }
 

@@ -50,10 +50,6 @@ export class Program {
     this.names = [...this.locations.keys()];
   }
 
-  delete() {
-    this.gl.deleteProgram(this.handle);
-  }
-
   use() {
     this.gl.useProgram(this.handle);
   }

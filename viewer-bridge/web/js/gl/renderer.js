@@ -10,6 +10,7 @@ import { Drawables, SceneBuffers } from "./buffers.js";
 import { Colliders, placeCapsule, placeCollider } from "./colliders.js";
 import { Ground } from "./ground.js";
 import { MAP_SIZE, ShadowMap, clipBox, lightView } from "./shadow-map.js";
+import { Sticks } from "./particles/sticks.js";
 import { ForceScale, arrowsOf } from "../state/forces.js";
 import { includeSolids } from "../state/framing.js";
 import { polesOf } from "../state/shapes.js";
@@ -91,6 +92,8 @@ export class Renderer {
     this.lightView = null;
     /** By variant. All are kept, because compiling is slow. @type {Map<string, Drawables>} */
     this.drawablesByVariant = new Map();
+    /** Created for the first ghost. @type {Sticks | null} */
+    this.ghostSticks = null;
     /** Those for the format of the frame. @type {Drawables | null} */
     this.drawables = null;
     /** @type {SceneBuffers | null} */
@@ -209,7 +212,7 @@ export class Renderer {
     if (stale.marks) this.buffers.writeMarks();
     if (frame !== this.frameDrawn) this.buffers.writePositions(frame);
     if (simulation.speeds !== null && this.paint() === PAINT.speeds) this.buffers.writeSpeeds(simulation.speeds.speeds);
-    if (simulation.ghost !== null && simulation.ghost !== this.ghostWritten) this.buffers.writeGhost(simulation.ghost);
+    if (simulation.ghost !== null && simulation.ghost !== this.ghostWritten) this.buffers.writeGhost(simulation.ghost, () => this.sticksOfGhosts());
     this.ghostWritten = simulation.ghost;
     if (stale.colliders) this.placeColliders(scene.isPlanar);
     if (stale.poles) this.placePoles();
@@ -232,6 +235,11 @@ export class Renderer {
     const drawables = this.drawablesByVariant.get(key) ?? new Drawables(this.gl, variant);
     this.drawablesByVariant.set(key, drawables);
     return drawables;
+  }
+
+  sticksOfGhosts() {
+    this.ghostSticks ??= new Sticks(this.gl, { isQuantised: false, hasEffects: false });
+    return this.ghostSticks;
   }
 
   /** @param {boolean} isPlanar */

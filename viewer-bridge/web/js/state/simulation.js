@@ -7,7 +7,7 @@ import { LiveState, flagsOf, updateTorn } from "./live-state.js";
 import { Topology } from "./topology.js";
 import { PIN } from "../net/wire.js";
 import { sceneAxes } from "../geometry/camera.js";
-import { add, boxOf, dot, length, scale, subtract } from "../geometry/math.js";
+import { add, boxOf, dot, length, sameNumbers, scale, subtract } from "../geometry/math.js";
 
 /** @typedef {import("../geometry/math.js").Vec3} Vec3 */
 /** @typedef {import("../geometry/math.js").Box} Box */
@@ -413,13 +413,6 @@ export class Simulation extends Emitter {
       default: // The number of pages, which STATS has as well, or a message of a later bridge.
     }
   }
-}
-
-/** @param {ArrayLike<number>} a @param {ArrayLike<number>} b */
-function sameNumbers(a, b) {
-  if (a.length !== b.length) return false;
-  for (let i = 0; i < a.length; i++) if (a[i] !== b[i]) return false;
-  return true;
 }
 
 /** @param {Collider} one @param {Vec3} up @returns {Plane[]} */

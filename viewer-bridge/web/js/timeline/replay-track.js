@@ -40,6 +40,8 @@ export class ReplayTrack {
     this.hashes = find("hashes", HTMLOutputElement);
     /** Recordings of the folder. @type {string[]} */
     this.names = [];
+    /** Recordings in the list of ghosts. @type {string[] | null} */
+    this.ghostNames = null;
     this.onChange = () => {};
     this.play.addEventListener("click", () => commands.run(simulation.playback?.is_playing ? "pause" : "resume"));
     this.loop.addEventListener("click", () => commands.run("loop", { is_on: !(simulation.playback?.is_looping ?? false) }));
@@ -49,7 +51,7 @@ export class ReplayTrack {
     find("track", HTMLElement).addEventListener("wheel", (event) => this.zoomBy(event), { passive: false });
     this.rate.addEventListener("change", () => commands.run("rate", { value: Number(this.rate.value) }));
     this.file.addEventListener("change", () => { location.href = addressBeside(location.pathname, this.file.value); });
-    this.ghost.addEventListener("change", () => commands.run("ghost", this.ghost.value === "" ? {} : { name: this.ghost.value }));
+    this.ghost.addEventListener("change", () => commands.run("ghost", this.ghost.value === "" ? {} : { name: this.ghost.value }, () => this.showGhost()));
     simulation.on("ghost", () => this.showGhost());
     simulation.on("hello", ({ recordings = [] }) => this.showFiles(recordings));
     simulation.on("timeline", () => this.showRecording());
@@ -174,7 +176,11 @@ export class ReplayTrack {
     const others = this.names.filter((name) => name !== this.shownName && name !== given);
     const names = given === null ? others : [given, ...others];
     find("ghost-choice", HTMLElement).hidden = names.length === 0;
-    this.ghost.replaceChildren(make("option", { value: "" }, "none"), ...names.map((name) => make("option", { value: name }, name)));
+    // An open list would close.
+    if (String(names) !== String(this.ghostNames)) {
+      this.ghostNames = names;
+      this.ghost.replaceChildren(make("option", { value: "" }, "none"), ...names.map((name) => make("option", { value: name }, name)));
+    }
     this.ghost.value = ghostChoice?.name ?? "";
     // Screen readers announce the result, not the progress.
     this.ghostNote.ariaLive = ghostChoice === null || PROGRESS.has(ghostChoice.state) ? "off" : "polite";

@@ -33,17 +33,19 @@ pub(super) struct Shown {
     file: String,
     particle_count: u32,
     rate_hz: u32,
+    first_step: u64,
     constraints: Vec<ConstraintState>,
 }
 
 impl Shown {
-    pub(super) fn of(recording: &Recording) -> Self {
+    pub(super) fn from_recording(recording: &Recording) -> Self {
         let run = recording.tape.run();
         Self {
             path: recording.path.clone(),
             file: recording.file.clone(),
             particle_count: run.particle_count,
             rate_hz: run.rate_hz,
+            first_step: recording.tape.first_step(),
             constraints: recording.load.constraints.clone(),
         }
     }
@@ -60,7 +62,7 @@ impl Shown {
             constraints.iter().map(|one| (one.a, one.b)).collect()
         };
         if ends(&ghost.load.constraints) != ends(&self.constraints) {
-            bail!("its constraints join other particles; {remedy}");
+            bail!("its constraints connect different particles; {remedy}");
         }
         if run.rate_hz != self.rate_hz {
             let (own, other) = (self.rate_hz, run.rate_hz);
@@ -99,6 +101,10 @@ impl Job {
     }
 
     fn open_and_compare(&self, reports: &Sender<Report>) -> anyhow::Result<Compared> {
+        let is_cancelled = || self.is_cancelled.load(Ordering::Relaxed);
+        if is_cancelled() {
+            return Ok(Compared::default());
+        }
         let ghost = open::open(&self.path, &self.stop, &mut |_| {})?;
         self.shown.check(&ghost)?;
         let (first, last) = (ghost.tape.first_step(), ghost.tape.last_step());
@@ -107,12 +113,13 @@ impl Job {
         let on_step = |step: u64| {
             if monotonic_ns() >= next_report_ns {
                 next_report_ns = monotonic_ns() + REPORT_PERIOD_NS;
-                let percent = 100 * step.saturating_sub(first) / (last - first).max(1);
+                let done = u128::from(step.saturating_sub(first));
+                let percent = 100 * done / u128::from((last - first).max(1));
                 let text = format!("comparing with {}: {percent} %", self.name);
                 let (state, first_different_step) = (GhostState::Comparing, None);
                 let _sent = reports.send(Report::Progress { state, text, first_different_step });
             }
-            !self.is_cancelled.load(Ordering::Relaxed)
+            !is_cancelled()
         };
         compare([&self.shown.path, &self.path], &self.stop, on_step).context("comparing")
     }
@@ -124,14 +131,16 @@ impl Job {
         let (state, mut text) = match (&compared.first, compared.common_steps) {
             (Some(first), _) => {
                 first_different_step = Some(first.step);
-                let time_s = first.step as f64 / f64::from(shown.rate_hz);
+                // As on the clock of the page, which begins with the file.
+                let steps = first.step.saturating_sub(shown.first_step);
+                let time_s = steps as f64 / f64::from(shown.rate_hz);
                 let place = &first.place;
                 let text =
                     format!("{name} differs from step {} ({time_s:.3} s): {place}", first.step);
                 (GhostState::Different, text)
             }
             (None, 0) => {
-                let text = format!("{name} has no recorded step of this one");
+                let text = format!("{name} and this recording have no step in common");
                 (GhostState::Failed, text)
             }
             (None, count) => {

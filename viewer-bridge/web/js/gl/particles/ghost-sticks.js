@@ -1,10 +1,12 @@
 // The ghost of a replay: the constraints of another recording as thin sticks, fainter where something hides them.
 
+import { sameNumbers } from "../../geometry/math.js";
 import { CONSTRAINT } from "../../net/wire.js";
 import { STICK, drawnSticks } from "../../state/topology.js";
 import { ArrayTexture, UNITS, layouts } from "../context.js";
 import { PAINT } from "../shaders.js";
-import { Sticks } from "./sticks.js";
+
+/** @typedef {import("./sticks.js").Sticks} Sticks */
 
 /** Opacity in front of everything else, and behind something. */
 const OPACITY = { visible: 0.9, hidden: 0.25 };
@@ -17,11 +19,11 @@ function ghostSticks(scene, limit) {
 }
 
 export class GhostSticks {
-  /** @param {WebGL2RenderingContext} gl @param {import("../../state/topology.js").Topology} topology @param {number} limit number of sticks at most */
-  constructor(gl, { scene }, limit) {
+  /** @param {WebGL2RenderingContext} gl @param {Sticks} sticks for positions as f32, which it fills @param {import("../../state/topology.js").Topology} topology @param {number} limit number of sticks at most */
+  constructor(gl, sticks, { scene }, limit) {
     this.gl = gl;
     this.scene = scene;
-    this.sticks = new Sticks(gl, { isQuantised: false, hasEffects: false });
+    this.sticks = sticks;
     this.positions = new ArrayTexture(gl, UNITS.u_positions, layouts(gl).f32x3, scene.particleCount);
     this.styles = Uint8Array.from(scene.constraintKinds);
     this.gains = new Float32Array(scene.constraintCount);
@@ -33,7 +35,7 @@ export class GhostSticks {
   /** @param {import("../../net/wire.js").Ghost} ghost */
   write(ghost) {
     if (ghost.positions.length > 0) this.positions.write(ghost.positions);
-    if (String(ghost.hidden) === String(this.hidden)) return;
+    if (sameNumbers(ghost.hidden, this.hidden)) return;
     this.hidden = ghost.hidden.slice();
     this.styles.set(this.scene.constraintKinds);
     for (const constraint of this.hidden) this.styles[constraint] |= STICK.isGone;
@@ -47,6 +49,7 @@ export class GhostSticks {
     const ghost = { u_lo: [0, 0, 0], u_scale: [1, 1, 1], u_paint: PAINT.off, u_is_all: 1, u_is_solid: 0, u_radius: 0, u_round: 0, u_stick: color, u_stick_faint: color, u_forward: forward };
     this.positions.bind();
     if (!isFlat) {
+      gl.enable(gl.DEPTH_TEST);
       gl.depthMask(false);
       gl.depthFunc(gl.GREATER);
       this.sticks.draw(uniforms, { ...ghost, u_opacity: OPACITY.hidden });
@@ -59,6 +62,6 @@ export class GhostSticks {
 
   delete() {
     this.positions.delete();
-    this.sticks.delete();
+    this.sticks.clear();
   }
 }

@@ -215,10 +215,4 @@ export class Sticks {
     gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, this.drawn.length);
     gl.bindVertexArray(null);
   }
-
-  delete() {
-    this.gl.deleteVertexArray(this.vao);
-    this.gl.deleteBuffer(this.buffer);
-    this.program.delete();
-  }
 }
