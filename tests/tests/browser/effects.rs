@@ -91,6 +91,11 @@ fn software_renderers_draw_no_effects_unless_the_user_turns_them_on() {
     assert_ne!(rig.tab.hash(), plain);
     rig.tab.key('x');
     rig.tab.wait("!viewer.toggles.effects");
+    // A phone has no keys, but the panel.
+    rig.tab.evaluate("document.querySelector('#effects').click()");
+    rig.tab.wait("viewer.toggles.effects && document.querySelector('#effects').checked");
+    rig.tab.key('x');
+    rig.tab.wait("!viewer.toggles.effects && !document.querySelector('#effects').checked");
     assert_eq!(rig.tab.hash(), plain);
 }
 

@@ -32,6 +32,9 @@ export class Views {
     this.resetStep = null;
     this.buttons = [...find("toggles", HTMLElement).querySelectorAll("button")];
     for (const button of this.buttons) button.addEventListener("click", () => this.toggle(button.dataset.toggle ?? ""));
+    /** Phones have no keys. */
+    this.effects = find("effects", HTMLInputElement);
+    this.effects.addEventListener("change", () => this.toggle("effects"));
     app.simulation.on("scene", (scene) => this.begin(scene));
     app.simulation.on("ground", () => { if (!this.isFramed) this.showFirstView(); });
     app.simulation.on("frame", () => this.follow());
@@ -124,6 +127,7 @@ export class Views {
       const key = /** @type {keyof typeof renderer.toggles} */ (button.dataset.toggle);
       button.setAttribute("aria-pressed", String(renderer.toggles[key]));
     }
+    this.effects.checked = renderer.toggles.effects;
     renderer.isDirty = true;
   }
 
