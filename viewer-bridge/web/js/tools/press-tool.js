@@ -87,9 +87,16 @@ export class PressTool {
   velocity(nowMs) {
     const last = this.trail[this.trail.length - 1];
     if (last.ms < nowMs - VELOCITY_MS) return [0, 0, 0];
-    const [first] = this.trail;
-    const span = Math.max(last.ms - Math.max(first.ms, last.ms - VELOCITY_MS), VELOCITY_MS_MIN);
-    return scale(subtract(this.targetAt(last.at), this.targetAt(first.at)), 1000 / span);
+    const begin = Math.max(this.trail[0].ms, last.ms - VELOCITY_MS);
+    const span = Math.max(last.ms - begin, VELOCITY_MS_MIN);
+    return scale(subtract(this.targetAt(last.at), this.targetAt(this.pointerAt(begin))), 1000 / span);
+  }
+
+  /** The position of the pointer between the first two of its trail. @param {number} ms @returns {Pixel} */
+  pointerAt(ms) {
+    const [first, next = first] = this.trail;
+    const share = next.ms > first.ms ? clamp((ms - first.ms) / (next.ms - first.ms), 0, 1) : 0;
+    return { x: first.at.x + (next.at.x - first.at.x) * share, y: first.at.y + (next.at.y - first.at.y) * share };
   }
 
   /** @returns {import("./tool.js").Trace} */
