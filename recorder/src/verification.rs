@@ -22,7 +22,9 @@ use crate::log::LogReader;
 use crate::recorded_scene::scene_to_simulate;
 pub use checks::{StepRange, VerifyError, VerifyOptions};
 use checks::{Verification, check_header};
-pub use difference::{Difference, distance, first_difference};
+pub use difference::{
+    Difference, SnapshotDifference, distance, first_difference, snapshot_difference,
+};
 pub use finding::{NotIdentical, SnapshotFinding, StepGap};
 pub use report::{Verdict, VerifyReport};
 pub use resimulation::{Resimulation, ResimulationError};

@@ -5,6 +5,8 @@ use std::fmt;
 use serde::Serialize;
 use sim_contract::ParticleState;
 
+use crate::log::Frame;
+
 /// One field of one particle in two states.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Difference {
@@ -54,6 +56,24 @@ pub fn first_difference(
         let [recorded, simulated] = [old[place], new[place]].map(|bits| value(field, bits));
         Some(Difference { particle, field, recorded, simulated })
     })
+}
+
+/// The first difference of two snapshots of a step.
+#[derive(Debug, Clone, PartialEq)]
+pub enum SnapshotDifference {
+    /// A field of a particle.
+    Particle(Difference),
+    /// All particles are equal, but not the hash, which includes the torn constraints.
+    TornConstraints,
+}
+
+/// Returns the first difference of two snapshots of a step, compared bit by bit. Both have the same number of
+/// particles.
+pub fn snapshot_difference(a: &Frame, b: &Frame) -> Option<SnapshotDifference> {
+    if let Some(found) = first_difference(a.payload(), b.payload()) {
+        return Some(SnapshotDifference::Particle(found));
+    }
+    (a.row.state_hash != b.row.state_hash).then_some(SnapshotDifference::TornConstraints)
 }
 
 /// Returns the distance between the positions of a particle in two states, in m. It is computed in f64, so that the

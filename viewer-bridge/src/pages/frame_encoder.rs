@@ -83,7 +83,7 @@ impl FrameEncoder {
             u16: formats.u16.then(|| encode(Format::U16)),
             colliders: self.colliders.clone(),
             forces: state.forces.map(|forces| encode_forces(head.stamp, forces)),
-            ghost: state.ghost.map(|ghost| encode_ghost(state.epoch, ghost)),
+            ghost: state.ghost.map(Ghost::encode),
             speeds: wanted
                 .speeds
                 .then(|| Speeds::from_particles(head.stamp, state.particles).encode()),
@@ -112,10 +112,4 @@ impl FrameEncoder {
 
 fn encode_forces(stamp: Stamp, forces: &sim_contract::Forces) -> Bytes {
     Forces { stamp, rate_hz: forces.header.rate_hz, rows: forces.rows.clone() }.encode()
-}
-
-fn encode_ghost(epoch: u32, ghost: &Ghost) -> Bytes {
-    let mut ghost = ghost.clone();
-    ghost.stamp.epoch = epoch;
-    ghost.encode()
 }

@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 use std::collections::VecDeque;
 
 use anyhow::{Context, bail};
-use recorder::verification::first_difference;
+use recorder::verification::{SnapshotDifference, snapshot_difference};
 use recorder::{FileSource, Frame, FrameReader, LogEnd, Message, OutcomeRow};
 use serde_json::Value;
 use sim_contract::{Action, ParticleState};
@@ -168,22 +168,21 @@ impl Comparison {
 
     fn state_difference(&self, step: u64) -> Option<StateDifference> {
         let (a, b) = (self.a.frame.as_ref()?, self.b.frame.as_ref()?);
-        if let Some(found) = first_difference(a.payload(), b.payload()) {
-            let (particle, field) = (Some(found.particle), found.field);
-            return Some(StateDifference {
+        Some(match snapshot_difference(a, b)? {
+            SnapshotDifference::Particle(found) => StateDifference {
                 step,
-                particle,
-                field,
+                particle: Some(found.particle),
+                field: found.field,
                 a: found.recorded,
                 b: found.simulated,
-            });
-        }
-        (a.row.state_hash != b.row.state_hash).then(|| StateDifference {
-            step,
-            particle: None,
-            field: "the torn constraints, state hash",
-            a: format!("{:016x}", a.row.state_hash),
-            b: format!("{:016x}", b.row.state_hash),
+            },
+            SnapshotDifference::TornConstraints => StateDifference {
+                step,
+                particle: None,
+                field: "the torn constraints, state hash",
+                a: format!("{:016x}", a.row.state_hash),
+                b: format!("{:016x}", b.row.state_hash),
+            },
         })
     }
 

@@ -61,9 +61,9 @@ impl ScenePoses {
     /// Returns the pose of a collider that a node publishes. Leaves out the rotation about an axis of symmetry. `None` if
     /// the scene has no such collider.
     pub fn collider(&self, index: u32, now: &ColliderFields) -> Option<Pose> {
-        let (from, to) = (center(&self.colliders.get(index as usize)?.fields()), center(now));
-        let at_load = self.colliders.get(index as usize)?.fields();
-        let rotation = match self.colliders[index as usize] {
+        let geometry = self.colliders.get(index as usize)?;
+        let at_load = geometry.fields();
+        let rotation = match geometry {
             ColliderGeometry::Box { .. } | ColliderGeometry::Mesh { .. } => {
                 quaternion(now.rotation) * quaternion(at_load.rotation).conjugate()
             }
@@ -73,7 +73,7 @@ impl ScenePoses {
             }
             ColliderGeometry::Sphere { .. } | ColliderGeometry::Bounds { .. } => DQuat::IDENTITY,
         };
-        Some(pose(to - from, rotation))
+        Some(pose(center(now) - center(&at_load), rotation))
     }
 
     /// Returns the pose of an anchor whose particles are at `position`, which is `None` for a particle that

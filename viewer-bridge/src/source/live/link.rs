@@ -226,11 +226,13 @@ impl Link {
                 self.undo.remove_client(client);
             }
             RequestKind::Command { id, command: Command::Undo { takes_others } } => {
-                self.carrier.clear();
                 let request = UndoRequest { client, id, takes_others };
                 let answer = self.undo.begin(request, self.newest.get(), &mut self.client);
-                if let Some(outcome) = answer {
-                    sinks.publish(&Update::Answer { client, outcome: &outcome });
+                match answer {
+                    Some(outcome) => {
+                        sinks.publish(&Update::Answer { client, outcome: &outcome });
+                    }
+                    None => self.carrier.clear(),
                 }
             }
             RequestKind::Command {
@@ -254,7 +256,7 @@ impl Link {
         }
     }
 
-    /// Carries something for a client, or lets it go.
+    /// Lifts, carries or releases an object for a client.
     fn carry(
         &mut self,
         client: ClientId,
@@ -296,10 +298,6 @@ impl Link {
         shown: &ShownState,
         sinks: &Sinks,
     ) {
-        if matches!(command, Command::Reset {} | Command::Load { .. } | Command::Rewind { .. }) {
-            // No move may follow it in the node's queue.
-            self.carrier.clear();
-        }
         let state = self.newest.get();
         let context = CommandContext {
             epoch: shown.epoch(),
@@ -310,11 +308,17 @@ impl Link {
         };
         let known = (&self.keyframes, &*self.catalog);
         let awaited = state.and_then(|state| self.undo.prepare(client, &command, &state, known));
+        let is_restart =
+            matches!(command, Command::Reset {} | Command::Load { .. } | Command::Rewind { .. });
         let before = self.dispatch.last_command();
         if let Some(outcome) = self.dispatch.submit(client, id, command, context) {
             sinks.publish(&Update::Answer { client, outcome: &outcome });
         }
         let number = self.dispatch.last_command();
+        if is_restart && number != before {
+            // No move may follow it in the node's queue.
+            self.carrier.clear();
+        }
         if let Some(awaited) = awaited.filter(|_| number != before) {
             self.undo.await_outcome(number, awaited);
         }

@@ -52,14 +52,15 @@ pub(super) fn handle_outcomes(
 ) {
     let HeldByClients { dispatch, carrier, undo } = held;
     for outcome in outcomes {
-        sinks.publish(&Update::Outcome(&OutcomeRow::from(outcome)));
+        let row = OutcomeRow::from(outcome);
+        sinks.publish(&Update::Outcome(&row));
         let action = outcome.command.action();
         if outcome.is_applied() {
             end_grabs(dispatch, &action);
-            if OutcomeRow::from(outcome).replaces_state() || matches!(action, Action::Load { .. }) {
+            if row.replaces_state() || matches!(action, Action::Load { .. }) {
                 carrier.clear();
             }
-            if OutcomeRow::from(outcome).replaces_state() {
+            if row.replaces_state() {
                 sinks.publish(&Update::Reset { step: outcome.step });
             }
         }

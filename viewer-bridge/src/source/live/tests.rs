@@ -1,5 +1,6 @@
 //! A link and an owner in one process. The owner publishes in the order of each test.
 
+mod carrying;
 mod undo;
 
 use std::sync::{Arc, Mutex};

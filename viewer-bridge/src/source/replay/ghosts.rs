@@ -128,18 +128,22 @@ impl Ghosts {
     }
 
     /// Starts the thread of the chosen ghost once that of the last one has ended: there is one at a time, however
-    /// fast pages choose.
-    fn start_waiting(&mut self) {
+    /// fast pages choose. Returns whether it failed.
+    fn start_waiting(&mut self) -> bool {
         if self.thread.as_ref().is_some_and(|thread| !thread.is_finished()) {
-            return;
+            return false;
         }
-        let Some((job, sender)) = self.waiting.take() else { return };
+        let Some((job, sender)) = self.waiting.take() else { return false };
         let builder = thread::Builder::new().name("ghost".to_owned());
         match builder.spawn(move || job.run(&sender)) {
-            Ok(thread) => self.thread = Some(thread),
+            Ok(thread) => {
+                self.thread = Some(thread);
+                false
+            }
             Err(error) => {
                 self.text.state = GhostState::Failed;
                 self.text.text = format!("cannot start the thread that opens it: {error}");
+                true
             }
         }
     }
@@ -150,9 +154,8 @@ impl Ghosts {
 
     /// Takes the reports of the thread. Returns whether there were any.
     pub(super) fn update(&mut self) -> bool {
-        self.start_waiting();
+        let mut has_changed = self.start_waiting();
         let Some(chosen) = &mut self.chosen else { return false };
-        let mut has_changed = false;
         for report in chosen.reports.try_iter() {
             has_changed = true;
             match report {
@@ -179,6 +182,7 @@ impl Ghosts {
     /// A signal has arrived.
     pub(super) fn read(
         &mut self,
+        epoch: u32,
         state: &TapeState,
         constraints: &[ConstraintState],
     ) -> Result<bool, ReadError> {
@@ -191,7 +195,10 @@ impl Ghosts {
         }
         let has_state = (tape.first_step()..=tape.last_step()).contains(&step);
         let ghost = match has_state.then(|| tape.state_at(step)).transpose() {
-            Ok(ghost) => ghost.map(|ghost| to_ghost(&ghost, state, constraints)),
+            Ok(ghost) => ghost.map(|ghost| {
+                let stamp = Stamp { epoch, step: ghost.row.step };
+                Ghost { stamp, ..to_ghost(&ghost, state, constraints) }
+            }),
             Err(TapeError::Read(ReadError::Interrupted)) => return Err(ReadError::Interrupted),
             // An unreadable state of the ghost hides it, and leaves the recording on show.
             Err(_) => None,
@@ -206,7 +213,7 @@ impl Ghosts {
     }
 }
 
-/// Builds the message with a state of the ghost, which has the particles and constraints of the state on show.
+/// Builds the message with a state of the ghost, without its stamp. It has the particles and constraints of the state on show.
 fn to_ghost(ghost: &TapeState, shown: &TapeState, constraints: &[ConstraintState]) -> Ghost {
     let particles = &ghost.particles;
     let (farthest, distance) = if ghost.row.step == shown.row.step {
@@ -215,7 +222,7 @@ fn to_ghost(ghost: &TapeState, shown: &TapeState, constraints: &[ConstraintState
         (0, f32::NAN)
     };
     Ghost {
-        stamp: Stamp { epoch: 0, step: ghost.row.step },
+        stamp: Stamp::default(),
         farthest,
         distance,
         positions: particles.iter().map(|one| finite(one).unwrap_or([f32::NAN; 3])).collect(),

@@ -234,7 +234,7 @@ impl<'a> Player<'a> {
             }
         }
         self.read_forces()?;
-        if self.ghosts.read(&self.state, &self.recording.load.constraints)? {
+        if self.ghosts.read(self.shown.epoch(), &self.state, &self.recording.load.constraints)? {
             self.on_show = None;
         }
         let faults = self

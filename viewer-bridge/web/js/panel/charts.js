@@ -161,7 +161,7 @@ export class Charts {
     this.isStale = true;
   }
 
-  /** Draws one plot in every second animation frame, so that none takes long: each is new about eight times a second. */
+  /** Draws one plot in every second animation frame, so that none takes long: six plots are new five times a second. */
   tick() {
     const { plots } = this;
     this.isDrawing = !this.isDrawing;

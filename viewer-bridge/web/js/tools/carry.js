@@ -1,4 +1,4 @@
-// Carrying: moves a collider or an anchor along with the pointer, and lets it go with the velocity of the pointer.
+// Carrying: moves a collider or an anchor along with the pointer, and releases it with the velocity of the pointer.
 
 import { subtract } from "../geometry/math.js";
 import { PressTool } from "./press-tool.js";
@@ -35,7 +35,7 @@ export class CarryTool extends PressTool {
     this.release(this.velocity(performance.now()));
   }
 
-  /** Puts the object down where it is. */
+  /** Puts the object down: it only reaches its last target. */
   cancel() {
     this.release([0, 0, 0]);
   }

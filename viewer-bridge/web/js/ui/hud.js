@@ -2,6 +2,7 @@
 // screen readers announce every change.
 
 import { trim } from "./format.js";
+import { sceneUnits } from "./units.js";
 
 const INTERVAL_MS = 250;
 
@@ -34,12 +35,12 @@ export class Hud {
     // A paused scene is drawn on demand, so it has no meaningful rate.
     const pace = this.simulation.isLookingBack ? " · in the past" : !this.simulation.isAlive ? " · last state" : this.simulation.isPaused ? " · paused" : `${factor} · ${drawnPerSecond} fps`;
     const tears = torn.length > 0 ? ` · ${torn.length} torn` : "";
-    return `step ${frame.step} · ${frame.simTime.toFixed(2)} s${pace} · ${scene.particleCount} particles · ${scene.constraintCount} constraints${tears}${ghost === null ? "" : ` · ${apart(ghost)}`}`;
+    return `step ${frame.step} · ${frame.simTime.toFixed(2)} s${pace} · ${scene.particleCount} particles · ${scene.constraintCount} constraints${tears}${ghost === null ? "" : ` · ${apart(ghost, sceneUnits(scene).length)}`}`;
   }
 }
 
-/** The distance of the ghost from the state on show. @param {import("../net/wire.js").Ghost} ghost */
-function apart({ distance, farthest, step }) {
+/** The distance of the ghost from the state on show. @param {import("../net/wire.js").Ghost} ghost @param {string} unit of length */
+function apart({ distance, farthest, step }, unit) {
   if (Number.isNaN(distance)) return `ghost at step ${step}`;
-  return distance === 0 ? "ghost at the same place" : `ghost up to ${trim(distance)} m away (particle ${farthest})`;
+  return distance === 0 ? "ghost at the same place" : `ghost up to ${trim(distance)} ${unit} away (particle ${farthest})`;
 }

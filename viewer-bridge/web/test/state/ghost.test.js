@@ -8,7 +8,7 @@ import { Hud } from "../../js/ui/hud.js";
 const scene = {
   kind: "scene", epoch: 1, step: 0, particleCount: 2, constraintCount: 0, triangleCount: 0, isPlanar: true, min: [0, 0, 0], max: [1, 1, 1],
   positions: new Float32Array(6), ends: new Uint32Array(0), restLengths: new Float32Array(0), triangles: new Uint32Array(0),
-  constraintKinds: new Uint8Array(0), name: "", up: "y", meshes: new Map(),
+  constraintKinds: new Uint8Array(0), name: "", unit: "px", up: "y", meshes: new Map(),
 };
 const frame = (step) => ({
   kind: "frame", epoch: 1, step, number: step, simTime: 0, particleCount: 2, lo: [0, 0, 0], scale: [1, 1, 1],
@@ -42,6 +42,6 @@ test("the status line has the distance of the ghost", () => {
   };
   assert.ok(!text([]).includes("ghost"));
   assert.match(text([ghost(9, 0)]), / · ghost at the same place$/);
-  assert.match(text([ghost(9, 0.0125)]), / · ghost up to 0\.0125 m away \(particle 1\)$/);
+  assert.match(text([ghost(9, 0.0125)]), / · ghost up to 0\.0125 px away \(particle 1\)$/);
   assert.match(text([ghost(8, NaN)]), / · ghost at step 8$/);
 });

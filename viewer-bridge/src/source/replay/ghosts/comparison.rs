@@ -3,7 +3,7 @@
 use std::cmp::Ordering;
 use std::path::Path;
 
-use recorder::verification::first_difference;
+use recorder::verification::{SnapshotDifference, snapshot_difference};
 use recorder::{FileSource, Frame, FrameReader, LogEnd, LogReader, ReadError};
 use sim_contract::Stop;
 
@@ -70,11 +70,11 @@ fn end_text(end: Option<&LogEnd>) -> String {
 }
 
 fn difference(a: &Frame, b: &Frame) -> Option<FirstDifference> {
-    let step = a.row.step;
-    if let Some(found) = first_difference(a.payload(), b.payload()) {
-        let place = format!("particle {}, {}", found.particle, found.field);
-        return Some(FirstDifference { step, place });
-    }
-    (a.row.state_hash != b.row.state_hash)
-        .then(|| FirstDifference { step, place: "the torn constraints".to_owned() })
+    let place = match snapshot_difference(a, b)? {
+        SnapshotDifference::Particle(found) => {
+            format!("particle {}, {}", found.particle, found.field)
+        }
+        SnapshotDifference::TornConstraints => "the torn constraints".to_owned(),
+    };
+    Some(FirstDifference { step: a.row.step, place })
 }

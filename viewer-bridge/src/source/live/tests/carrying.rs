@@ -1,0 +1,56 @@
+//! Carrying: the moves that the bridge sends, and their order among other commands.
+
+use sim_contract::{Action, ColliderState, CollidersHeader, Load as OwnerLoad};
+
+use super::{Fixture, RUN_ID, actions, load};
+use crate::message::{Command, ObjectKind};
+
+/// A scene whose collider is where the node shows it.
+const BALL: &[u8] =
+    b"version = 1\n[[collider]]\nshape = 'sphere'\ncenter = [0, 0, 0]\nradius = 0.5\n";
+
+/// A fixture in which the page has thrown the ball, and the node has the first move.
+fn thrown() -> Fixture {
+    let mut fixture = Fixture::start();
+    fixture.owner.load(&OwnerLoad { scene: BALL, ..load(1, 1) }).unwrap();
+    let collider = ColliderState { shape: 2, radius: 0.5, ..ColliderState::default() };
+    let header = CollidersHeader { run_id: RUN_ID, step: 1, ..CollidersHeader::default() };
+    fixture.owner.publish_colliders(header, &[collider]).unwrap();
+    fixture.publish(1, 1, 2);
+    fixture.read();
+    let epoch = fixture.shown.epoch();
+    let (object, index) = (ObjectKind::Collider, 0);
+    fixture.command(Command::Lift { epoch, object, index });
+    fixture.command(Command::Throw { object, index, velocity: [1.0, 0.0, 0.0] });
+    assert!(matches!(actions(&fixture.arrived())[..], [Action::MoveCollider { .. }]));
+    fixture
+}
+
+/// The node goes on, and the bridge reads its state.
+fn next(fixture: &mut Fixture, step: u64) -> Vec<Action> {
+    fixture.publish(step, 1, 2);
+    fixture.read();
+    fixture.link.move_carried(&fixture.sinks);
+    actions(&fixture.arrived())
+}
+
+#[test]
+fn no_move_follows_a_reset_in_the_queue_of_the_node() {
+    let mut fixture = thrown();
+    assert!(matches!(next(&mut fixture, 2)[..], [Action::MoveCollider { .. }]));
+    fixture.command(Command::Reset {});
+    // The node has not applied it yet.
+    assert_eq!(next(&mut fixture, 3), [Action::Reset]);
+    assert_eq!(next(&mut fixture, 4), []);
+}
+
+#[test]
+fn what_is_refused_at_once_ends_no_motion() {
+    for refused in
+        [Command::Undo { takes_others: false }, Command::Load { scene: "no such scene".to_owned() }]
+    {
+        let mut fixture = thrown();
+        fixture.command(refused);
+        assert!(matches!(next(&mut fixture, 2)[..], [Action::MoveCollider { .. }]));
+    }
+}
