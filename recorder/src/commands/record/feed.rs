@@ -180,6 +180,9 @@ impl Feed {
         if !self.intake.has_started() {
             return;
         }
+        if let Some(content) = self.selector.take_last_snapshot() {
+            self.queue.push(Item { content, log_time_ns: realtime_ns() });
+        }
         let (is_full, last_step) = (self.is_full(1), self.intake.last_step());
         let (stop_reason, end) = match &mut self.trigger {
             Some(trigger) => {

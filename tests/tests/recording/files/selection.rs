@@ -41,6 +41,7 @@ fn every_seventh_snapshot_verifies_and_nothing_counts_as_lost() {
     for step in (0..=200).step_by(7) {
         assert!(recorded.contains(&step), "step {step} is not in {recorded:?}");
     }
+    assert_eq!(recorded.last(), Some(&200), "the file ends where the recording did");
     // The others have a keyframe: the first step, and the first one after each round of commands.
     let others: Vec<_> = recorded.iter().filter(|step| *step % 7 != 0).collect();
     assert!(recorded.len() < 60 && others.len() >= 8, "{recorded:?}");

@@ -2,7 +2,7 @@
 
 use std::num::NonZeroU32;
 
-use recorder::{AllCounts, ContentSelection, Message, Topic};
+use recorder::{AllCounts, ContentSelection, Message, ParticleBuffer, StepRow, Topic};
 
 use crate::cli::parse::whole_number_in;
 use crate::commands::record::queue::Content;
@@ -103,6 +103,8 @@ pub(super) struct Selector {
     keyframes_since_state: Option<u32>,
     /// Step of the newest state that a command put in place. Its particles follow from nothing else.
     in_place_step: Option<u64>,
+    /// The newest snapshot, if it was left out and no message of a later step was selected after it.
+    last_left_out: Option<(StepRow, ParticleBuffer)>,
     /// Only `left_out` is set.
     counts: AllCounts,
 }
@@ -114,6 +116,7 @@ impl Selector {
             keyframe_step: None,
             keyframes_since_state: None,
             in_place_step: None,
+            last_left_out: None,
             counts: AllCounts::default(),
         }
     }
@@ -130,24 +133,48 @@ impl Selector {
                     _ => {}
                 }
                 let is_selected = self.has(message.topic());
+                if is_selected {
+                    self.last_left_out.take_if(|(row, _)| row.step < message.step());
+                }
                 is_selected.then_some(Content::Update(message))
             }
             Content::Snapshot(row, particles) => {
                 let is_due = row.snapshot_index.is_none_or(|one| self.selection.has_snapshot(one));
                 let has_keyframe = self.keyframe_step == Some(row.step);
                 if !is_due && !has_keyframe {
-                    self.counts[Topic::Steps].left_out += 1;
-                    self.counts[Topic::Particles].left_out += 1;
-                    None
-                } else if self.selection.is_only_commands() && !self.is_state(row.step) {
-                    self.counts[Topic::Particles].left_out += 1;
-                    Some(Content::Update(Message::Step(row)))
-                } else if self.has(Topic::Particles) {
-                    Some(Content::Snapshot(row, particles))
-                } else {
-                    Some(Content::Update(Message::Step(row)))
+                    self.count_snapshots(|left_out| left_out + 1);
+                    self.last_left_out = Some((row, particles));
+                    return None;
                 }
+                self.last_left_out = None;
+                Some(self.recorded_part(row, particles))
             }
+        }
+    }
+
+    /// Returns what is recorded of the newest snapshot at the end of a file, if it was left out: a file ends
+    /// where the recording did, not up to a period before.
+    pub(super) fn take_last_snapshot(&mut self) -> Option<Content> {
+        let (row, particles) = self.last_left_out.take()?;
+        self.count_snapshots(|left_out| left_out - 1);
+        Some(self.recorded_part(row, particles))
+    }
+
+    fn count_snapshots(&mut self, count: impl Fn(u64) -> u64) {
+        for topic in [Topic::Steps, Topic::Particles] {
+            self.counts[topic].left_out = count(self.counts[topic].left_out);
+        }
+    }
+
+    /// Returns what is recorded of a snapshot: all of it, or its header.
+    fn recorded_part(&mut self, row: StepRow, particles: ParticleBuffer) -> Content {
+        if self.selection.is_only_commands() && !self.is_state(row.step) {
+            self.counts[Topic::Particles].left_out += 1;
+            Content::Update(Message::Step(row))
+        } else if self.has(Topic::Particles) {
+            Content::Snapshot(row, particles)
+        } else {
+            Content::Update(Message::Step(row))
         }
     }
 
@@ -173,6 +200,7 @@ impl Selector {
     /// Returns the counts of a file, and begins with those of the next one.
     pub(super) fn take_counts(&mut self) -> AllCounts {
         self.keyframes_since_state = None;
+        self.last_left_out = None;
         std::mem::take(&mut self.counts)
     }
 }
@@ -202,10 +230,35 @@ mod tests {
         let selected: Vec<_> =
             (0..10).filter(|one| selector.select(snapshot(*one)).is_some()).collect();
         assert_eq!(selected, [0, 3, 4, 8]);
+        let last = selector.take_last_snapshot();
+        assert!(matches!(last, Some(Content::Snapshot(StepRow { step: 9, .. }, _))));
+        assert_eq!(selector.take_last_snapshot(), None);
         let counts = selector.take_counts();
-        assert_eq!((counts[Topic::Particles].left_out, counts[Topic::Steps].left_out), (6, 6));
+        assert_eq!((counts[Topic::Particles].left_out, counts[Topic::Steps].left_out), (5, 5));
         assert_eq!(counts[Topic::Keyframe].left_out, 1);
         assert_eq!(selector.take_counts(), AllCounts::default());
+    }
+
+    #[test]
+    fn a_file_ends_with_its_last_snapshot_unless_messages_of_a_later_step_came_after_it() {
+        let mut selector = Selector::new(ContentSelection::new(NonZeroU32::new(4).unwrap(), &[]));
+        let last_step = |selector: &mut Selector| match selector.take_last_snapshot() {
+            Some(Content::Snapshot(row, _)) => Some(row.step),
+            _ => None,
+        };
+        for index in 0..=8 {
+            selector.select(snapshot(index));
+        }
+        assert_eq!(last_step(&mut selector), None, "the last one was selected");
+        selector.select(snapshot(9));
+        selector.select(keyframe(9));
+        assert_eq!(last_step(&mut selector), Some(9));
+        selector.select(snapshot(10));
+        selector.select(keyframe(11));
+        assert_eq!(last_step(&mut selector), None, "step 11 has begun in the file");
+        selector.select(snapshot(13));
+        selector.take_counts();
+        assert_eq!(last_step(&mut selector), None, "it belongs to the file before");
     }
 
     #[test]
