@@ -34,6 +34,11 @@ use crate::store::{Location, ParticleStore, Paths, Progress};
 /// Pairs within this number of contact distances at the start of the stage take part in it, because
 /// another contact may push them together.
 const REACH: f32 = 1.1;
+/// Distance by which particles may leave their paths, in contact distances. A larger one finds more candidates, a
+/// smaller one finds them more often. No bit depends on it.
+const PARTICLES_MARGIN: f32 = 0.35;
+/// The same where cloths touch as surfaces. There, candidates are found at the start of the paths, so bits depend on it.
+const SURFACES_MARGIN: f32 = 0.2;
 /// Largest number of candidates for each particle, on average. It bounds the time of a step in which
 /// particles pile up in one point.
 const CANDIDATES_PER_PARTICLE: usize = 8;
@@ -86,6 +91,7 @@ impl ParticleContacts {
         let count = particles.len();
         let candidate_count_max = CANDIDATES_PER_PARTICLE * count;
         let has_surfaces = mode == ContactMode::Surfaces;
+        let margin = if has_surfaces { SURFACES_MARGIN } else { PARTICLES_MARGIN };
         let surfaces = has_surfaces.then(|| {
             SurfaceContacts::new(model, &particles, (thickness, kernels), candidate_count_max)
         });
@@ -98,7 +104,7 @@ impl ParticleContacts {
         };
         Self {
             thickness,
-            margin: 0.2 * thickness,
+            margin: margin * thickness,
             locations: vec![Location::default(); count],
             states: vec![PackedParticle::default(); count],
             paths: Paths::default(),

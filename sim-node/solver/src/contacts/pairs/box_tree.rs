@@ -1,9 +1,13 @@
 //! A tree of boxes. Four boxes form a node, four nodes the node above, and so on.
 
 use crate::contacts::bounds::Bounds;
+use crate::kernels::Kernels;
+use crate::kernels::lanes::{LaneWork, Lanes8, Wide};
 
 /// Number of children of a node.
 const ARITY: usize = 4;
+/// Largest number of levels: a tree has at most 2^24 leaves, and the root.
+const LEVELS_MAX: usize = 13;
 
 /// Order to go on, or to give a search up.
 pub(super) type Search = std::ops::ControlFlow<()>;
@@ -12,6 +16,32 @@ pub(super) type Search = std::ops::ControlFlow<()>;
 #[derive(Debug, Clone, Default)]
 pub(super) struct BoxTree {
     levels: Vec<Vec<Bounds>>,
+    /// The same boxes, to compare all sides of two boxes at once.
+    sides: Vec<Vec<Sides>>,
+}
+
+/// The largest coordinates of a box and 0, and its smallest coordinates with the opposite sign and 0.
+#[derive(Debug, Clone, Copy)]
+struct Sides(Lanes8);
+
+impl Sides {
+    fn new(Bounds { min, max }: &Bounds) -> Self {
+        Self([max[0], max[1], max[2], 0.0, -min[0], -min[1], -min[2], 0.0])
+    }
+
+    /// True if a box is at most `distance` apart from another one on every axis, for which `facing` has
+    /// [`facing_sides`].
+    #[inline(always)]
+    fn are_near<W: Wide>(&self, facing: W, distance: W) -> bool {
+        W::bits(facing.is_at_most(W::load(&self.0, 0) + distance)) == 0xff
+    }
+}
+
+/// The numbers of a box that those of [`Sides`] are compared with.
+#[inline(always)]
+fn facing_sides(Bounds { min, max }: &Bounds, distance: f32) -> Lanes8 {
+    let [x, y, z] = min.map(|min| min - distance);
+    [x, y, z, 0.0, -max[0], -max[1], -max[2], 0.0]
 }
 
 impl BoxTree {
@@ -23,7 +53,9 @@ impl BoxTree {
             levels.push(vec![Bounds::EMPTY; length]);
             length = if length > 1 { length.div_ceil(ARITY) } else { 0 };
         }
-        Self { levels }
+        assert!(levels.len() <= LEVELS_MAX, "the tree has too many leaves");
+        let sides = levels.iter().map(|level| level.iter().map(Sides::new).collect()).collect();
+        Self { levels, sides }
     }
 
     pub(super) fn leaves(&self) -> &[Bounds] {
@@ -41,6 +73,11 @@ impl BoxTree {
             }
             below = level;
         }
+        for (level, sides) in self.levels.iter().zip(&mut self.sides) {
+            for (bounds, sides) in level.iter().zip(sides) {
+                *sides = Sides::new(bounds);
+            }
+        }
     }
 
     /// Passes every pair of leaves of this tree that are near each other to `accept`, each once and with
@@ -48,10 +85,11 @@ impl BoxTree {
     pub(super) fn search(
         &self,
         distance: f32,
+        kernels: Kernels,
         accept: &mut impl FnMut([u32; 2]) -> Search,
     ) -> Search {
         match self.root() {
-            Some(root) => self.search_nodes([root; 2], distance, accept),
+            Some(root) => kernels.run(PairSearch { tree: self, root, distance, accept }),
             None => Search::Continue(()),
         }
     }
@@ -74,35 +112,16 @@ impl BoxTree {
         Some(Node { level, index: 0 })
     }
 
+    #[inline(always)]
     fn bounds(&self, node: Node) -> &Bounds {
         &self.levels[node.level][node.index]
     }
 
-    fn children(&self, node: Node) -> impl Iterator<Item = Node> + use<> {
+    #[inline(always)]
+    fn children(&self, node: Node) -> impl DoubleEndedIterator<Item = Node> + Clone + use<> {
         let level = node.level - 1;
         let end = self.levels[level].len().min(ARITY * (node.index + 1));
         (ARITY * node.index..end).map(move |index| Node { level, index })
-    }
-
-    /// The nodes are of one level, and the first one is not behind the second.
-    fn search_nodes(
-        &self,
-        [a, b]: [Node; 2],
-        distance: f32,
-        accept: &mut impl FnMut([u32; 2]) -> Search,
-    ) -> Search {
-        if !self.bounds(a).are_near(self.bounds(b), distance) {
-            return Search::Continue(());
-        }
-        if a.level == 0 {
-            return accept([a, b].map(Node::leaf));
-        }
-        for left in self.children(a) {
-            for right in self.children(b).filter(|right| left.index <= right.index) {
-                self.search_nodes([left, right], distance, accept)?;
-            }
-        }
-        Search::Continue(())
     }
 
     fn search_nodes_between(
@@ -131,6 +150,48 @@ impl BoxTree {
     }
 }
 
+/// Finds the pairs of leaves of a tree that are near each other, depth first.
+struct PairSearch<'a, F> {
+    tree: &'a BoxTree,
+    root: Node,
+    distance: f32,
+    accept: &'a mut F,
+}
+
+impl<F: FnMut([u32; 2]) -> Search> LaneWork for PairSearch<'_, F> {
+    type Output = Search;
+
+    #[inline(always)]
+    fn run<W: Wide>(self) -> Search {
+        let Self { tree, root, distance, accept } = self;
+        let (d, no) = (distance, 0.0);
+        let far_side = W::load(&[no, no, no, no, d, d, d, no], 0);
+        // Pairs of nodes of one level that are near each other, the first one not behind the second. Later pairs
+        // lie deeper.
+        let mut stack = [[root; 2]; LEVELS_MAX * ARITY * ARITY];
+        let mut length = 1;
+        while length > 0 {
+            length -= 1;
+            let [a, b] = stack[length];
+            if a.level == 0 {
+                accept([a, b].map(Node::leaf))?;
+                continue;
+            }
+            let rights = tree.children(b);
+            for left in tree.children(a).rev() {
+                let facing = W::load(&facing_sides(tree.bounds(left), distance), 0);
+                for right in rights.clone().rev().take_while(|right| left.index <= right.index) {
+                    if tree.sides[right.level][right.index].are_near(facing, far_side) {
+                        stack[length] = [left, right];
+                        length += 1;
+                    }
+                }
+            }
+        }
+        Search::Continue(())
+    }
+}
+
 /// A box in a tree.
 #[derive(Debug, Clone, Copy)]
 struct Node {
@@ -141,6 +202,7 @@ struct Node {
 
 impl Node {
     #[allow(clippy::cast_possible_truncation, reason = "a tree has at most 2^24 leaves")]
+    #[inline(always)]
     fn leaf(self) -> u32 {
         self.index as u32
     }

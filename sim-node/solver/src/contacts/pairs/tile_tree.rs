@@ -146,7 +146,7 @@ impl TileTree {
             pairs.clear();
             search
         };
-        let mut found = tree.boxes.search(query.distance, &mut |pair| {
+        let mut found = tree.boxes.search(query.distance, kernels, &mut |pair| {
             pairs.push(pair);
             if pairs.len() < TILE_PAIRS_MAX { Search::Continue(()) } else { examine(&mut pairs) }
         });
