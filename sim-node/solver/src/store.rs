@@ -19,7 +19,6 @@ use graph::Graph;
 use layout::Layout;
 pub(crate) use layout::{Configured, Location, SceneFields, TetherPlace};
 use patch::{Patch, SheetFamilies};
-use paths::GraphWork;
 pub(crate) use paths::{Paths, Progress};
 pub(crate) use pulls::{Receivers, TetherEnds};
 use survey::Survey;
@@ -275,25 +274,6 @@ impl ParticleStore {
             Some(sheet) => self.patches[sheet].set_position(location.index(), position),
         }
         self.set_displacement(location, displacement);
-    }
-
-    /// Replaces the paths with those that the particles are about to take.
-    pub(crate) fn save_paths(&self, paths: &mut Paths) {
-        paths.sheets.resize_with(self.patches.len(), Vec::new);
-        for (patch, saved) in self.patches.iter().zip(&mut paths.sheets) {
-            patch.save_paths(saved);
-        }
-        paths.graph.clear();
-        paths.graph.extend_from_slice(self.graph.packed_particles());
-    }
-
-    /// Returns true if a particle is not where its path leads. NaN is beside no path.
-    pub(crate) fn is_beside(&self, paths: &Paths, progress: Progress) -> bool {
-        let kernels = self.kernels();
-        let (now, saved) = (self.graph.packed_particles(), paths.graph.as_slice());
-        let mut sheets = self.patches.iter().zip(&paths.sheets);
-        kernels.run(GraphWork { now, saved, progress })
-            || sheets.any(|(patch, saved)| kernels.run(patch.beside_work(saved, progress)))
     }
 
     /// Computes the velocities that the wind adds in the running substep.

@@ -41,6 +41,19 @@ impl Bounds {
         }
     }
 
+    /// A box that holds the points of this one after `time` displacements, `time` >= 0, which lie within another box.
+    #[inline(always)]
+    pub(super) fn moved(&self, displacements: &Self, time: f32) -> Self {
+        if time == 0.0 {
+            // The product with an infinite displacement would be NaN.
+            return *self;
+        }
+        Self {
+            min: axes(|axis| self.min[axis] + time * displacements.min[axis]),
+            max: axes(|axis| self.max[axis] + time * displacements.max[axis]),
+        }
+    }
+
     pub(super) fn contains(&self, point: [f32; 3]) -> bool {
         (0..3).all(|axis| self.min[axis] <= point[axis] && point[axis] <= self.max[axis])
     }

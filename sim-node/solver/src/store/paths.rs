@@ -1,5 +1,6 @@
 //! The straight paths that the particles take in a step, to tell whether one has left its own.
 
+use super::{Location, ParticleStore, Patch};
 use crate::kernels::lanes::{LaneWork, PackedParticle, Wide, axes};
 
 /// Position and displacement of every particle at one time.
@@ -8,7 +9,13 @@ pub(crate) struct Paths {
     /// By patch.
     pub(super) sheets: Vec<Vec<f32>>,
     pub(super) graph: Vec<PackedParticle>,
+    /// The tile of every particle, in the same order.
+    pub(super) tiles_of_sheets: Vec<Vec<u32>>,
+    pub(super) tiles_of_graph: Vec<u32>,
 }
+
+/// The tile of a particle that no one follows.
+pub(super) const NO_TILE: u32 = u32::MAX;
 
 /// The elapsed part of the paths, and how far a particle may be beside its own.
 #[derive(Debug, Clone, Copy)]
@@ -34,38 +41,118 @@ impl Progress {
     }
 }
 
+impl ParticleStore {
+    /// Replaces the paths with those that the particles are about to take.
+    pub(crate) fn save_paths(&self, paths: &mut Paths) {
+        paths.sheets.resize_with(self.patches.len(), Vec::new);
+        for (patch, saved) in self.patches.iter().zip(&mut paths.sheets) {
+            patch.save_paths(saved);
+        }
+        paths.graph.clear();
+        paths.graph.extend_from_slice(self.graph.packed_particles());
+    }
+
+    /// Replaces the path of one particle: position and displacement.
+    pub(crate) fn set_saved_path(
+        &self,
+        paths: &mut Paths,
+        location: Location,
+        path: [[f32; 3]; 2],
+    ) {
+        let index = location.index();
+        match location.sheet() {
+            None => {
+                let [[x, y, z], [dx, dy, dz]] = path;
+                paths.graph[index] = PackedParticle([x, y, z, 0.0, dx, dy, dz, 0.0]);
+            }
+            Some(sheet) => {
+                self.patches[sheet].set_saved_path(&mut paths.sheets[sheet], index, path);
+            }
+        }
+    }
+
+    /// Makes room for the paths of all particles, none of which has a tile.
+    pub(crate) fn prepare_paths(&self, paths: &mut Paths) {
+        self.save_paths(paths);
+        paths.tiles_of_sheets = self.patches.iter().map(Patch::no_tiles).collect();
+        paths.tiles_of_graph = vec![NO_TILE; paths.graph.len()];
+    }
+
+    /// Sets the tile of one particle.
+    pub(crate) fn set_tile(&self, paths: &mut Paths, location: Location, tile: u32) {
+        let index = location.index();
+        match location.sheet() {
+            None => paths.tiles_of_graph[index] = tile,
+            Some(sheet) => {
+                self.patches[sheet].set_tile(&mut paths.tiles_of_sheets[sheet], index, tile);
+            }
+        }
+    }
+
+    /// Marks the tiles of particles that are not where their paths lead. NaN is beside no path.
+    pub(crate) fn mark_strays(&self, paths: &Paths, progress: Progress, has_stray: &mut [bool]) {
+        let kernels = self.kernels();
+        let (now, saved) = (self.graph.packed_particles(), paths.graph.as_slice());
+        let tiles = paths.tiles_of_graph.as_slice();
+        kernels.run(GraphWork { now, saved, tiles, progress, has_stray: &mut *has_stray });
+        let sheets = paths.sheets.iter().zip(&paths.tiles_of_sheets);
+        for (patch, (saved, tiles)) in self.patches.iter().zip(sheets) {
+            kernels.run(patch.stray_work(saved, tiles, progress, &mut *has_stray));
+        }
+    }
+}
+
+/// Marks the tiles of particles in lanes with a bit.
+#[inline(always)]
+pub(super) fn mark_tiles(mut lanes: u32, tiles: &[u32; 8], has_stray: &mut [bool]) {
+    while lanes != 0 {
+        let tile = tiles[lanes.trailing_zeros() as usize];
+        if let Some(has_stray) = has_stray.get_mut(tile as usize) {
+            *has_stray = true;
+        }
+        lanes &= lanes - 1;
+    }
+}
+
 /// Compares the particles of the graph with their paths.
 pub(super) struct GraphWork<'a> {
     pub(super) now: &'a [PackedParticle],
     pub(super) saved: &'a [PackedParticle],
+    pub(super) tiles: &'a [u32],
     pub(super) progress: Progress,
+    pub(super) has_stray: &'a mut [bool],
 }
 
 impl LaneWork for GraphWork<'_> {
-    type Output = bool;
+    type Output = ();
 
     #[inline(always)]
-    fn run<W: Wide>(self) -> bool {
-        let (now, now_rest) = self.now.as_chunks();
-        let (saved, saved_rest) = self.saved.as_chunks();
-        for (now, saved) in now.iter().zip(saved) {
-            if self.is_beside::<W>(now, saved) {
-                return true;
-            }
+    fn run<W: Wide>(self) {
+        let Self { now, saved, tiles, progress, has_stray } = self;
+        let (now, now_rest) = now.as_chunks();
+        let (saved, saved_rest) = saved.as_chunks();
+        let (tiles, tiles_rest) = tiles.as_chunks();
+        for ((now, saved), tiles) in now.iter().zip(saved).zip(tiles) {
+            mark_tiles(beside::<W>(now, saved, progress), tiles, has_stray);
         }
         let mut last = [[PackedParticle::default(); 8]; 2];
         last[0][..now_rest.len()].copy_from_slice(now_rest);
         last[1][..saved_rest.len()].copy_from_slice(saved_rest);
-        self.is_beside::<W>(&last[0], &last[1])
+        let mut last_tiles = [NO_TILE; 8];
+        last_tiles[..tiles_rest.len()].copy_from_slice(tiles_rest);
+        mark_tiles(beside::<W>(&last[0], &last[1], progress), &last_tiles, has_stray);
     }
 }
 
-impl GraphWork<'_> {
-    #[inline(always)]
-    fn is_beside<W: Wide>(&self, now: &[PackedParticle; 8], saved: &[PackedParticle; 8]) -> bool {
-        let [[x, y, z, _], [dx, dy, dz, _]] = W::columns(now);
-        let now = [[x, y, z], [dx, dy, dz]];
-        let [[x, y, z, _], [dx, dy, dz, _]] = W::columns(saved);
-        W::any(self.progress.beside(now, [[x, y, z], [dx, dy, dz]]))
-    }
+/// Returns a bit for each particle that is beside its path.
+#[inline(always)]
+fn beside<W: Wide>(
+    now: &[PackedParticle; 8],
+    saved: &[PackedParticle; 8],
+    progress: Progress,
+) -> u32 {
+    let [[x, y, z, _], [dx, dy, dz, _]] = W::columns(now);
+    let now = [[x, y, z], [dx, dy, dz]];
+    let [[x, y, z, _], [dx, dy, dz, _]] = W::columns(saved);
+    W::bits(progress.beside(now, [[x, y, z], [dx, dy, dz]]))
 }

@@ -18,6 +18,8 @@ pub(super) struct BoxTree {
     levels: Vec<Vec<Bounds>>,
     /// The same boxes, to compare all sides of two boxes at once.
     sides: Vec<Vec<Sides>>,
+    /// By node: a leaf below it is marked. A search leaves pairs without a marked leaf out. All are marked at first.
+    is_marked: Vec<Vec<bool>>,
 }
 
 /// The largest coordinates of a box and 0, and its smallest coordinates with the opposite sign and 0.
@@ -55,11 +57,8 @@ impl BoxTree {
         }
         assert!(levels.len() <= LEVELS_MAX, "the tree has too many leaves");
         let sides = levels.iter().map(|level| level.iter().map(Sides::new).collect()).collect();
-        Self { levels, sides }
-    }
-
-    pub(super) fn leaves(&self) -> &[Bounds] {
-        self.levels.first().map_or(&[], Vec::as_slice)
+        let is_marked = levels.iter().map(|level| vec![true; level.len()]).collect();
+        Self { levels, sides, is_marked }
     }
 
     /// Replaces the leaves by `refit`, and computes the nodes above.
@@ -80,8 +79,21 @@ impl BoxTree {
         }
     }
 
-    /// Passes every pair of leaves of this tree that are near each other to `accept`, each once and with
-    /// itself, the earlier leaf first.
+    /// Marks leaves, and no others.
+    pub(super) fn mark(&mut self, is_marked: &[bool]) {
+        let Some((leaves, nodes)) = self.is_marked.split_first_mut() else { return };
+        leaves.copy_from_slice(is_marked);
+        let mut below = &*leaves;
+        for level in nodes {
+            for (node, children) in level.iter_mut().zip(below.chunks(ARITY)) {
+                *node = children.contains(&true);
+            }
+            below = level;
+        }
+    }
+
+    /// Passes every pair of leaves of this tree that are near each other, and one of which is marked, to `accept`,
+    /// each once and with itself, the earlier leaf first. The order of two pairs is that of [`pair_order`].
     pub(super) fn search(
         &self,
         distance: f32,
@@ -115,6 +127,11 @@ impl BoxTree {
     #[inline(always)]
     fn bounds(&self, node: Node) -> &Bounds {
         &self.levels[node.level][node.index]
+    }
+
+    #[inline(always)]
+    fn is_marked(&self, node: Node) -> bool {
+        self.is_marked[node.level][node.index]
     }
 
     #[inline(always)]
@@ -180,16 +197,35 @@ impl<F: FnMut([u32; 2]) -> Search> LaneWork for PairSearch<'_, F> {
             let rights = tree.children(b);
             for left in tree.children(a).rev() {
                 let facing = W::load(&facing_sides(tree.bounds(left), distance), 0);
-                for right in rights.clone().rev().take_while(|right| left.index <= right.index) {
-                    if tree.sides[right.level][right.index].are_near(facing, far_side) {
-                        stack[length] = [left, right];
-                        length += 1;
-                    }
+                let is_marked = tree.is_marked(left);
+                let rights = rights.clone().rev().take_while(|right| left.index <= right.index);
+                let near = rights.filter(|right| {
+                    let sides = &tree.sides[right.level][right.index];
+                    (is_marked | tree.is_marked(*right)) && sides.are_near(facing, far_side)
+                });
+                for right in near {
+                    stack[length] = [left, right];
+                    length += 1;
                 }
             }
         }
         Search::Continue(())
     }
+}
+
+/// A number that ascends over the pairs of leaves of [`BoxTree::search`]: a pair is two paths from the root down, and
+/// at each node the first one counts more.
+#[inline(always)]
+pub(super) fn pair_order(leaves: [u32; 2]) -> u64 {
+    // Two bits for each of the four children, two bits apart.
+    let [a, b] = leaves.map(|leaf| {
+        let mut bits = u64::from(leaf);
+        bits = (bits | bits << 16) & 0x0000_ffff_0000_ffff;
+        bits = (bits | bits << 8) & 0x00ff_00ff_00ff_00ff;
+        bits = (bits | bits << 4) & 0x0f0f_0f0f_0f0f_0f0f;
+        (bits | bits << 2) & 0x3333_3333_3333_3333
+    });
+    a << 2 | b
 }
 
 /// A box in a tree.

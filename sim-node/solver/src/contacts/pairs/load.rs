@@ -132,7 +132,7 @@ impl LoadPairs {
     ) -> Self {
         let bodies = bodies(model);
         let mut tree = TileTree::at_load(model, slots, kernels);
-        let query = Query { span: 0.0, distance: CONNECTED_REACH * thickness };
+        let query = Query { times: [0.0; 2], distance: CONNECTED_REACH * thickness };
         let count_max = PAIRS_PER_PARTICLE * slots.len();
         let (mut never, mut closer) = (Vec::new(), Vec::new());
         let _is_complete = tree.search(query, kernels, except, &mut |pair| {

@@ -6,7 +6,7 @@
 use super::box_tree::{BoxTree, Search};
 use crate::contacts::bounds::Bounds;
 use crate::kernels::Kernels;
-use crate::kernels::lanes::{LaneWork, Lanes8, Wide, axes};
+use crate::kernels::lanes::{LaneWork, Lanes8, PackedParticle, Wide, axes, map_axes};
 use crate::kernels::vectors::dot;
 use crate::scene::model::Model;
 
@@ -39,27 +39,36 @@ impl Tile {
         }
     }
 
-    /// Ends of the paths of one group of lanes, on one axis.
+    /// Positions of one group of lanes after `time` displacements, on one axis.
     #[inline(always)]
-    fn path<W: Wide>(&self, axis: usize, group: usize, span: W) -> [W; 2] {
-        [W::load(&self.x[axis][group], 0), self.position::<W>(axis, group, span)]
+    fn position<W: Wide>(&self, axis: usize, group: usize, time: W) -> W {
+        W::load(&self.x[axis][group], 0) + time * W::load(&self.d[axis][group], 0)
     }
 
-    /// Positions of one group of lanes after `span` displacements, on one axis.
+    /// Positions after `time` displacements, by group and axis.
     #[inline(always)]
-    fn position<W: Wide>(&self, axis: usize, group: usize, span: W) -> W {
-        W::load(&self.x[axis][group], 0) + span * W::load(&self.d[axis][group], 0)
-    }
-
-    /// Positions after `span` displacements, by group and axis.
-    #[inline(always)]
-    fn positions<W: Wide>(&self, span: f32) -> [[W; 3]; TILE / 8] {
-        let span = W::splat(span);
+    fn positions<W: Wide>(&self, time: f32) -> [[W; 3]; TILE / 8] {
+        let time = W::splat(time);
         let [x, y, z] = [0, 1, 2];
         [
-            [self.position(x, 0, span), self.position(y, 0, span), self.position(z, 0, span)],
-            [self.position(x, 1, span), self.position(y, 1, span), self.position(z, 1, span)],
+            [self.position(x, 0, time), self.position(y, 0, time), self.position(z, 0, time)],
+            [self.position(x, 1, time), self.position(y, 1, time), self.position(z, 1, time)],
         ]
+    }
+
+    /// Replaces the paths by those on which the particles are now, after `time` displacements.
+    #[inline(always)]
+    fn follow<W: Wide>(&mut self, states: &[PackedParticle; TILE], time: f32) {
+        let (groups, _) = states.as_chunks();
+        for (group, states) in groups.iter().enumerate() {
+            let [[x, y, z, _], [dx, dy, dz, _]] = W::columns(states);
+            let (x, d) = ([x, y, z], [dx, dy, dz]);
+            for axis in 0..3 {
+                let start = x[axis] - W::splat(time) * d[axis];
+                start.store(&mut self.x[axis][group], 0);
+                d[axis].store(&mut self.d[axis][group], 0);
+            }
+        }
     }
 
     /// Returns a bit for each particle that is in a box after `time` displacements.
@@ -95,8 +104,13 @@ pub(super) struct TileTree {
     pub(super) tiles: Vec<Tile>,
     /// Boxes of the paths of the tiles.
     pub(super) boxes: BoxTree,
+    /// Boxes of where the paths of the tiles begin.
+    starts: Vec<Bounds>,
     /// Boxes of the displacements of the tiles.
     pub(super) displacements: Vec<Bounds>,
+    /// By tile: a particle has left its path since the last search. All have at first.
+    pub(super) has_stray: Vec<bool>,
+    particle_count: usize,
     /// Pairs of tiles that are near each other, to be examined.
     tile_pairs: Vec<[u32; 2]>,
 }
@@ -105,9 +119,12 @@ impl TileTree {
     /// Makes a tree of empty tiles for `count` particles.
     pub(super) fn new(count: usize) -> Self {
         let tiles = vec![Tile::EMPTY; count.div_ceil(TILE)];
-        let displacements = vec![Bounds::EMPTY; tiles.len()];
+        let (starts, displacements) =
+            (vec![Bounds::EMPTY; tiles.len()], vec![Bounds::EMPTY; tiles.len()]);
         let boxes = BoxTree::new(tiles.len());
-        Self { tiles, boxes, displacements, tile_pairs: Vec::with_capacity(TILE_PAIRS_MAX) }
+        let has_stray = vec![true; tiles.len()];
+        let tile_pairs = Vec::with_capacity(TILE_PAIRS_MAX);
+        Self { tiles, boxes, starts, displacements, has_stray, particle_count: count, tile_pairs }
     }
 
     /// Makes a tree of particles at rest where they are at load.
@@ -117,19 +134,48 @@ impl TileTree {
             let position = model.particles[*particle as usize].position;
             tree.tiles[slot / TILE].set(slot % TILE, position, [0.0; 3]);
         }
-        tree.refit(0.0, kernels);
+        tree.refit([0.0; 2], kernels);
         tree
     }
 
-    /// Recomputes all boxes for paths of `span` displacements.
-    pub(super) fn refit(&mut self, span: f32, kernels: Kernels) {
-        let Self { tiles, boxes, displacements, .. } = self;
-        boxes.refit(|leaves| kernels.run(RefitWork { tiles, leaves, displacements, span }));
+    /// The slots of the particles in tiles with strays.
+    pub(super) fn slots_with_strays(&self) -> impl Iterator<Item = usize> + '_ {
+        let tiles = self.has_stray.iter().enumerate().filter(|(_, has_stray)| **has_stray);
+        tiles.flat_map(|(tile, _)| TILE * tile..self.particle_count.min(TILE * (tile + 1)))
+    }
+
+    /// Replaces the paths in tiles with strays by those on which the particles are now, after `time` displacements.
+    pub(super) fn follow_strays(&mut self, states: &[PackedParticle], time: f32, kernels: Kernels) {
+        let (states, _) = states.as_chunks();
+        let Self { tiles, has_stray, .. } = self;
+        kernels.run(FollowWork { tiles, states, time, has_stray });
+    }
+
+    /// Recomputes the boxes of tiles with strays for a part of the paths: from and to these numbers of displacements.
+    pub(super) fn refit(&mut self, times: [f32; 2], kernels: Kernels) {
+        let Self { tiles, boxes, starts, displacements, has_stray, .. } = self;
+        kernels.run(BoundsWork { tiles, starts, displacements, has_stray });
+        boxes.mark(has_stray);
+        boxes.refit(|leaves| {
+            let bounds = leaves.iter_mut().zip(starts.iter().zip(displacements.iter()));
+            for ((leaf, (start, displacement)), has_stray) in bounds.zip(has_stray) {
+                if *has_stray {
+                    let [from, to] = times.map(|time| start.moved(displacement, time));
+                    *leaf = from.union(&to);
+                }
+            }
+        });
+    }
+
+    /// A box that holds the particles of a tile after `time` displacements.
+    #[inline(always)]
+    fn bounds_at(&self, tile: u32, time: f32) -> Bounds {
+        self.starts[tile as usize].moved(&self.displacements[tile as usize], time)
     }
 
     /// Passes every pair of particles whose straight paths come nearer than the query's distance to
-    /// `accept`, as slots in ascending order. The order of two pairs depends only on the tree, not on the
-    /// other pairs. `except` leaves pairs out: for two tiles, it has a bit for each particle of the second one that a
+    /// `accept`, as slots in ascending order, if the tile of one of them has strays. The order of two pairs depends
+    /// only on the tree, not on the other pairs. `except` leaves pairs out: for two tiles, it has a bit for each particle of the second one that a
     /// particle of the first one leaves out.
     pub(super) fn search(
         &mut self,
@@ -159,57 +205,90 @@ impl TileTree {
     }
 }
 
-/// Computes the boxes of the tiles.
-struct RefitWork<'a> {
-    tiles: &'a [Tile],
-    leaves: &'a mut [Bounds],
-    displacements: &'a mut [Bounds],
-    span: f32,
+/// Gives the particles of tiles the paths on which they are.
+struct FollowWork<'a> {
+    tiles: &'a mut [Tile],
+    states: &'a [[PackedParticle; TILE]],
+    time: f32,
+    has_stray: &'a [bool],
 }
 
-impl LaneWork for RefitWork<'_> {
+impl LaneWork for FollowWork<'_> {
     type Output = ();
 
     #[inline(always)]
     fn run<W: Wide>(self) {
-        let span = W::splat(self.span);
-        let boxes = self.leaves.iter_mut().zip(self.displacements);
-        for (tile, (paths, displacements)) in self.tiles.iter().zip(boxes) {
-            for axis in 0..3 {
-                let ends = [0, 1].map(|group| tile.path(axis, group, span));
-                let [[a, b], [c, d]] = ends;
-                [paths.min[axis], paths.max[axis]] = extent::<W, 4>([a, b, c, d]);
-                let groups = [0, 1].map(|group| W::load(&tile.d[axis][group], 0));
-                [displacements.min[axis], displacements.max[axis]] = extent::<W, 2>(groups);
+        let tiles = self.tiles.iter_mut().zip(self.states).zip(self.has_stray);
+        for ((tile, states), has_stray) in tiles {
+            if *has_stray {
+                tile.follow::<W>(states, self.time);
             }
         }
     }
 }
 
-/// The smallest and the largest number. NaN is left out.
-#[inline(always)]
-fn extent<W: Wide, const COUNT: usize>(numbers: [W; COUNT]) -> [f32; 2] {
-    let least = W::splat(f32::NEG_INFINITY);
-    let (mut low, mut high) = (least, least);
-    for number in numbers {
-        low = (-number).max_or_rhs(low);
-        high = number.max_or_rhs(high);
-    }
-    [-greatest(low), greatest(high)]
+/// Computes the boxes of positions and displacements of the tiles with strays.
+struct BoundsWork<'a> {
+    tiles: &'a [Tile],
+    starts: &'a mut [Bounds],
+    displacements: &'a mut [Bounds],
+    has_stray: &'a [bool],
 }
 
+impl LaneWork for BoundsWork<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<W: Wide>(self) {
+        let boxes = self.starts.iter_mut().zip(self.displacements);
+        for ((tile, has_stray), (start, displacement)) in
+            self.tiles.iter().zip(self.has_stray).zip(boxes)
+        {
+            if *has_stray {
+                *start = bounds_of::<W>(&tile.x);
+                *displacement = bounds_of::<W>(&tile.d);
+            }
+        }
+    }
+}
+
+/// The box around points. NaN is left out.
 #[inline(always)]
-fn greatest<W: Wide>(numbers: W) -> f32 {
+fn bounds_of<W: Wide>([x, y, z]: &[TileColumn; 3]) -> Bounds {
+    let [(x_low, x_high), (y_low, y_high), (z_low, z_high)] =
+        [highest::<W>(x), highest::<W>(y), highest::<W>(z)];
+    let max = greatest([x_high, y_high, z_high]);
+    let min = greatest([x_low, y_low, z_low]);
+    Bounds { min: map_axes(min, |axis| -axis), max }
+}
+
+/// By lane, the largest of the negated numbers, and the largest of the numbers.
+#[inline(always)]
+fn highest<W: Wide>([first, second]: &TileColumn) -> (W, W) {
+    let least = W::splat(f32::NEG_INFINITY);
+    let (first, second) = (W::load(first, 0), W::load(second, 0));
+    // NaN leaves the right-hand side.
+    let low = (-second).max_or_rhs((-first).max_or_rhs(least));
+    let high = second.max_or_rhs(first.max_or_rhs(least));
+    (low, high)
+}
+
+/// The largest lane of each.
+#[inline(always)]
+fn greatest<W: Wide>([x, y, z]: [W; 3]) -> [f32; 3] {
+    let larger = |[a, b]: [W; 2]| a.max_or_rhs(b);
+    // Halves, then quarters: x, y, z, z and the same of the second half.
+    let quarters = larger(W::unzip(larger(W::unzip(x, y)), larger(W::unzip(z, z))));
     let mut lanes = [0.0; 8];
-    numbers.store(&mut lanes, 0);
-    lanes.into_iter().fold(f32::NEG_INFINITY, |most, lane| if lane > most { lane } else { most })
+    quarters.store(&mut lanes, 0);
+    axes(|axis| if lanes[axis] > lanes[axis + 4] { lanes[axis] } else { lanes[axis + 4] })
 }
 
 /// Condition of [`TileTree::search`].
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Query {
-    /// Number of displacements that a path has.
-    pub(super) span: f32,
+    /// The part of the paths: from and to these numbers of displacements.
+    pub(super) times: [f32; 2],
     pub(super) distance: f32,
 }
 
@@ -232,7 +311,8 @@ impl<E: Fn([u32; 2]) -> [u16; TILE], F: FnMut([u32; 2]) -> Search> LaneWork
         let Self { tree, pairs, query, except, accept } = self;
         for &[a, b] in pairs {
             let pair = TilePair::<W>::new(tree, [a, b], query);
-            let mut lanes = pair.lanes_near_box(&tree.boxes.leaves()[b as usize]);
+            let [from, to] = query.times;
+            let mut lanes = pair.lanes_near_box(&tree.bounds_at(b, 0.5 * (from + to)));
             if lanes == 0 {
                 continue;
             }
@@ -284,16 +364,17 @@ impl<'a, W: Wide> TilePair<'a, W> {
     fn new(tree: &'a TileTree, slots: [u32; 2], query: Query) -> Self {
         let tiles = slots.map(|tile| &tree.tiles[tile as usize]);
         let [a, b] = slots.map(|tile| &tree.displacements[tile as usize]);
-        let half = 0.5 * query.span;
-        let distance = query.distance + half * a.distance_max(b);
+        let [from, to] = query.times;
+        let middle_time = 0.5 * (from + to);
+        let distance = query.distance + 0.5 * (to - from) * a.distance_max(b);
         let mut left = [[0.0; TILE]; 3];
-        for (group, middle) in tiles[0].positions::<W>(half).into_iter().enumerate() {
+        for (group, middle) in tiles[0].positions::<W>(middle_time).into_iter().enumerate() {
             for axis in 0..3 {
                 let (lanes, _) = left[axis].as_chunks_mut();
                 middle[axis].store(&mut lanes[group], 0);
             }
         }
-        Self { tiles, query, distance, left, right: tiles[1].positions(half) }
+        Self { tiles, query, distance, left, right: tiles[1].positions(middle_time) }
     }
 
     /// Returns a bit for each particle of the first tile that is near a box in the middle of the time.
@@ -350,8 +431,9 @@ impl<'a, W: Wide> TilePair<'a, W> {
         let (r, v) = (axes(|axis| x_b[axis] - x_a[axis]), axes(|axis| d_b[axis] - d_a[axis]));
         // The time at which straight paths are nearest; NaN where the particles move alike.
         let time = -dot(r, v) / dot(v, v);
-        let time = if time > 0.0 { time } else { 0.0 };
-        let time = if time < self.query.span { time } else { self.query.span };
+        let [from, to] = self.query.times;
+        let time = if time > from { time } else { from };
+        let time = if time < to { time } else { to };
         let apart = axes(|axis| r[axis] + time * v[axis]);
         dot(apart, apart) < self.query.distance * self.query.distance
     }

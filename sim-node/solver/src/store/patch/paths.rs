@@ -2,7 +2,7 @@
 
 use super::Patch;
 use crate::kernels::lanes::{LaneWork, Wide, axes, lane_groups};
-use crate::store::paths::Progress;
+use crate::store::paths::{NO_TILE, Progress, mark_tiles};
 
 /// Saved fields of a row: position and displacement.
 const SAVED_FIELDS: usize = 6;
@@ -21,36 +21,62 @@ impl Patch {
         }
     }
 
-    /// Compares the particles with saved paths. Returns true if one is beside its own.
-    pub(crate) fn beside_work<'a>(
+    /// Replaces the saved path of a particle: position and displacement.
+    pub(crate) fn set_saved_path(&self, saved: &mut [f32], index: usize, path: [[f32; 3]; 2]) {
+        let (stride, row_length) = (self.layout.stride, self.layout.row_length);
+        let first = index / row_length * SAVED_FIELDS * stride + index % row_length;
+        for (field, number) in path.into_iter().flatten().enumerate() {
+            saved[first + field * stride] = number;
+        }
+    }
+
+    /// Places for the tiles of all particles.
+    pub(crate) fn no_tiles(&self) -> Vec<u32> {
+        vec![NO_TILE; self.layout.rows * self.layout.stride]
+    }
+
+    /// Sets the tile of a particle.
+    pub(crate) fn set_tile(&self, tiles: &mut [u32], index: usize, tile: u32) {
+        let (stride, row_length) = (self.layout.stride, self.layout.row_length);
+        tiles[index / row_length * stride + index % row_length] = tile;
+    }
+
+    /// Compares the particles with saved paths. Marks the tiles of those that are beside theirs.
+    pub(crate) fn stray_work<'a>(
         &'a self,
         saved: &'a [f32],
+        tiles: &'a [u32],
         progress: Progress,
-    ) -> impl LaneWork<Output = bool> + 'a {
-        BesideWork { patch: self, saved, progress }
+        has_stray: &'a mut [bool],
+    ) -> impl LaneWork<Output = ()> + 'a {
+        StrayWork { patch: self, saved, tiles, progress, has_stray }
     }
 }
 
-struct BesideWork<'a> {
+struct StrayWork<'a> {
     patch: &'a Patch,
     saved: &'a [f32],
+    tiles: &'a [u32],
     progress: Progress,
+    has_stray: &'a mut [bool],
 }
 
-impl LaneWork for BesideWork<'_> {
-    type Output = bool;
+impl LaneWork for StrayWork<'_> {
+    type Output = ();
 
     #[inline(always)]
-    fn run<W: Wide>(self) -> bool {
+    fn run<W: Wide>(self) {
         let layout = &self.patch.layout;
         let (stride, count) = (layout.stride, layout.columns.div_ceil(8));
         let numbers: &[f32] = bytemuck::cast_slice(&self.patch.lines);
         let rows = numbers.chunks_exact(layout.row_length);
-        for (row, saved) in rows.zip(self.saved.chunks_exact(SAVED_FIELDS * stride)) {
+        let saved = self.saved.chunks_exact(SAVED_FIELDS * stride);
+        for ((row, saved), tiles) in rows.zip(saved).zip(self.tiles.chunks_exact(stride)) {
             let x = axes(|axis| lane_groups(row, axis * stride, count));
             let d = axes(|axis| lane_groups(row, (DISPLACEMENT_AT + axis) * stride, count));
             let saved_x = axes(|axis| lane_groups(saved, axis * stride, count));
             let saved_d = axes(|axis| lane_groups(saved, (3 + axis) * stride, count));
+            let (tiles, _) = tiles.as_chunks();
             for group in 0..count {
                 let now = [
                     axes(|axis| W::load(&x[axis][group], 0)),
@@ -60,11 +86,9 @@ impl LaneWork for BesideWork<'_> {
                     axes(|axis| W::load(&saved_x[axis][group], 0)),
                     axes(|axis| W::load(&saved_d[axis][group], 0)),
                 ];
-                if W::any(self.progress.beside(now, saved)) {
-                    return true;
-                }
+                let lanes = W::bits(self.progress.beside(now, saved));
+                mark_tiles(lanes, &tiles[group], self.has_stray);
             }
         }
-        false
     }
 }
