@@ -175,41 +175,51 @@ struct PairSearch<'a, F> {
     accept: &'a mut F,
 }
 
+/// Pairs of nodes of one level that are near each other, the first one not behind the second. Later pairs lie deeper.
+struct Stack {
+    pairs: [[Node; 2]; LEVELS_MAX * ARITY * ARITY],
+    length: usize,
+}
+
 impl<F: FnMut([u32; 2]) -> Search> LaneWork for PairSearch<'_, F> {
     type Output = Search;
 
     #[inline(always)]
     fn run<W: Wide>(self) -> Search {
         let Self { tree, root, distance, accept } = self;
-        let (d, no) = (distance, 0.0);
-        let far_side = W::load(&[no, no, no, no, d, d, d, no], 0);
-        // Pairs of nodes of one level that are near each other, the first one not behind the second. Later pairs
-        // lie deeper.
-        let mut stack = [[root; 2]; LEVELS_MAX * ARITY * ARITY];
-        let mut length = 1;
-        while length > 0 {
-            length -= 1;
-            let [a, b] = stack[length];
-            if a.level == 0 {
-                accept([a, b].map(Node::leaf))?;
-                continue;
-            }
-            let rights = tree.children(b);
-            for left in tree.children(a).rev() {
-                let facing = W::load(&facing_sides(tree.bounds(left), distance), 0);
-                let is_marked = tree.is_marked(left);
-                let rights = rights.clone().rev().take_while(|right| left.index <= right.index);
-                let near = rights.filter(|right| {
-                    let sides = &tree.sides[right.level][right.index];
-                    (is_marked | tree.is_marked(*right)) && sides.are_near(facing, far_side)
-                });
-                for right in near {
-                    stack[length] = [left, right];
-                    length += 1;
-                }
+        let mut stack = Stack { pairs: [[root; 2]; LEVELS_MAX * ARITY * ARITY], length: 1 };
+        while stack.length > 0 {
+            stack.length -= 1;
+            let pair = stack.pairs[stack.length];
+            if pair[0].level == 0 {
+                accept(pair.map(Node::leaf))?;
+            } else {
+                stack.push_children::<W>(tree, pair, distance);
             }
         }
         Search::Continue(())
+    }
+}
+
+impl Stack {
+    /// Pushes the pairs of children of two nodes that are near each other. (A closure in the loop would be compiled for
+    /// the baseline processor.)
+    #[inline(always)]
+    fn push_children<W: Wide>(&mut self, tree: &BoxTree, [a, b]: [Node; 2], distance: f32) {
+        let (d, no) = (distance, 0.0);
+        let far_side = W::load(&[no, no, no, no, d, d, d, no], 0);
+        let rights = tree.children(b);
+        for left in tree.children(a).rev() {
+            let facing = W::load(&facing_sides(tree.bounds(left), distance), 0);
+            let is_marked = tree.is_marked(left);
+            for right in rights.clone().rev().take_while(|right| left.index <= right.index) {
+                let sides = &tree.sides[right.level][right.index];
+                if (is_marked | tree.is_marked(right)) && sides.are_near(facing, far_side) {
+                    self.pairs[self.length] = [left, right];
+                    self.length += 1;
+                }
+            }
+        }
     }
 }
 
