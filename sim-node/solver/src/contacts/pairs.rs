@@ -2,7 +2,7 @@
 //!
 //! In every substep the pairs that are near at its end are pushed apart one after the other, in an order
 //! that a hash of the pair gives. Which pairs are near is exact: candidates are found for the paths that
-//! the particles are about to take, and again when one of them leaves its path. No list outlives its step,
+//! the particles are about to take, and again around those that leave theirs. No list outlives its step,
 //! so a snapshot with its keyframe is still the complete state.
 //!
 //! Where cloths touch as surfaces, a particle and a triangle take the place of most pairs.
