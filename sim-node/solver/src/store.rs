@@ -11,6 +11,7 @@ mod patch;
 mod paths;
 mod publish;
 mod pulls;
+mod strays;
 mod survey;
 mod workers;
 
