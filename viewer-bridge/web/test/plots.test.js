@@ -72,7 +72,11 @@ test("a height is measured along the up axis of the scene", () => {
 /** The strokes of a series in a plot that is 10 pixels wide and high: lists of points. */
 function strokes(one, window) {
   const paths = [];
-  const context = { beginPath() {}, stroke() {}, moveTo: (x, y) => paths.push([[x, y]]), lineTo: (x, y) => paths.at(-1).push([x, y]) };
+  let left = 0;
+  const context = {
+    beginPath() {}, stroke() {}, translate: (x) => { left += x; },
+    moveTo: (x, y) => paths.push([[left + x, y]]), lineTo: (x, y) => paths.at(-1).push([left + x, y]),
+  };
   drawLine(context, one, { cursor: null, ...window }, 10, (value) => value, "");
   return paths;
 }

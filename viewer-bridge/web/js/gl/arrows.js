@@ -73,6 +73,8 @@ export class Arrows {
   /** @param {import("../state/forces.js").Arrow[]} arrows @param {number} unitsPerNewton */
   set(arrows, unitsPerNewton) {
     const { gl } = this;
+    this.count = arrows.length;
+    if (this.count === 0) return;
     const ends = new Float32Array(arrows.length * FLOATS);
     arrows.forEach(({ from, force }, k) => {
       ends.set(from, k * FLOATS);
@@ -80,11 +82,10 @@ export class Arrows {
     });
     gl.bindBuffer(gl.ARRAY_BUFFER, this.buffer);
     gl.bufferData(gl.ARRAY_BUFFER, ends, gl.DYNAMIC_DRAW);
-    this.count = arrows.length;
   }
 
   /** Draws each arrow on a rim, so that it is visible on any background.
-   * @param {Record<string, number | number[]>} uniforms @param {{ width: number, rim: number, color: number[], rimColor: number[] }} style sizes in device pixels */
+   * @param {import("./context.js").Uniforms} uniforms @param {{ width: number, rim: number, color: number[], rimColor: number[] }} style sizes in device pixels */
   draw(uniforms, { width, rim, color, rimColor }) {
     if (this.count === 0) return;
     const { gl } = this;

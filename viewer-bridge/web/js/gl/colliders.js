@@ -7,7 +7,7 @@ import { VERTEX_FLOATS, ball, cube, cubeEdges, facets } from "./solids.js";
 
 /** @typedef {import("../geometry/math.js").Vec3} Vec3 */
 /** @typedef {import("../net/wire.js").Collider} Collider */
-/** @typedef {Record<string, number | number[]>} Uniforms */
+/** @typedef {import("./context.js").Uniforms} Uniforms */
 /** A solid in the scene: `solid` is a number for the mesh of that collider, `shape` has its axes scaled by its size, `turn` its unit axes for normals, `a` and `b` are the ends of its axis.
  * @typedef {{ solid: "ball" | "cube" | "edges" | number, shape: number[], turn: number[], a: Vec3, b: Vec3 }} Placed */
 

@@ -28,8 +28,17 @@ export function rendererName(gl) {
 /** True for a renderer without a graphics processor, for which effects are too slow. @param {string} name */
 export const isSoftware = (name) => /swiftshader|llvmpipe|lavapipe|softpipe|software|basic render/i.test(name);
 
-/** @type {Record<string, number | number[]>} */
+/** Values of uniforms by name. @typedef {Record<string, number | number[] | Float32Array>} Uniforms */
+
+/** @type {Uniforms} */
 const NONE = {};
+
+/** Writes a fraction in place: as a number, each read of it for a program would allocate. @param {Uniforms} all @param {string} name @param {number} value */
+export function setNumber(all, name, value) {
+  const place = all[name];
+  if (place instanceof Float32Array) place[0] = value;
+  else all[name] = Float32Array.of(value);
+}
 
 /** A linked program, with the locations of its uniforms. */
 export class Program {
@@ -55,14 +64,17 @@ export class Program {
   }
 
   /** Sets the uniforms that have a value, choosing the type by its length. Values of `own` come before the others.
-   * @param {Record<string, number | number[]>} values @param {Record<string, number | number[]>} own */
+   * @param {Uniforms} values @param {Uniforms} own */
   set(values, own = NONE) {
     const { gl } = this;
-    for (const name of this.names) {
+    // By index: an iterator would allocate.
+    for (let index = 0; index < this.names.length; index++) {
+      const name = this.names[index];
       const value = own[name] ?? values[name];
       if (value === undefined) continue;
       const location = this.locations.get(name) ?? null;
       if (typeof value === "number") gl.uniform1f(location, value);
+      else if (value.length === 1) gl.uniform1fv(location, value);
       else if (value.length === 2) gl.uniform2fv(location, value);
       else if (value.length === 3) gl.uniform3fv(location, value);
       else if (value.length === 4) gl.uniform4fv(location, value);

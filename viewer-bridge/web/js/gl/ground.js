@@ -75,17 +75,17 @@ export class Ground {
     this.vao = gl.createVertexArray();
   }
 
-  /** @param {Record<string, number | number[]>} uniforms */
+  /** @param {import("./context.js").Uniforms} uniforms */
   drawBackdrop(uniforms) {
     this.quad(this.backdrop, uniforms);
   }
 
-  /** @param {Record<string, number | number[]>} uniforms */
+  /** @param {import("./context.js").Uniforms} uniforms */
   draw(uniforms) {
     this.quad(this.program, uniforms);
   }
 
-  /** @param {Program} program @param {Record<string, number | number[]>} uniforms */
+  /** @param {Program} program @param {import("./context.js").Uniforms} uniforms */
   quad(program, uniforms) {
     const { gl } = this;
     program.use();

@@ -4,7 +4,7 @@
 import { add, addScaled, dot, multiply, normalize, scale, scaleThenMove, shadowOnto, tangents } from "../geometry/math.js";
 import { paletteOf, paletteUniforms } from "./theme.js";
 import { PAINT } from "./shaders.js";
-import { isSoftware, openContext, rendererName } from "./context.js";
+import { isSoftware, openContext, rendererName, setNumber } from "./context.js";
 import { Arrows } from "./arrows.js";
 import { Drawables, SceneBuffers } from "./buffers.js";
 import { Colliders, placeCapsule, placeCollider } from "./colliders.js";
@@ -18,7 +18,7 @@ import { polesOf } from "../state/shapes.js";
 /** @typedef {import("../geometry/math.js").Vec3} Vec3 */
 /** @typedef {import("../state/simulation.js").Simulation} Simulation */
 /** @typedef {import("../geometry/camera.js").Camera} Camera */
-/** @typedef {Record<string, number | number[]>} Uniforms */
+/** @typedef {import("./context.js").Uniforms} Uniforms */
 /** @typedef {{ surface: boolean, sticks: boolean, particles: boolean, pins: boolean, heat: boolean, shadow: boolean, forces: boolean, effects: boolean }} Toggles */
 
 /** Limit on device pixels per CSS pixel: the cost grows with the square, and a finer picture looks the same. */
@@ -37,6 +37,11 @@ const SHADOW_REACH = 1.2;
 const COLLIDER_BEHIND = { slopes: 1, units: 500 };
 /** Scenes with more particles than a ragdoll are drawn with thinner sticks. */
 const FEW_PARTICLES = 60;
+
+/** How far sticks and points come forward, in depth, and how round they look. A new object in each picture would be garbage. */
+const STICKS = { solid: { u_forward: 4e-4 }, flat: { u_round: 0.35 }, shadow: {} };
+const POINTS = { solid: { forward: 1.2e-3, round: 1 }, flat: { forward: 0, round: 0.6 } };
+const [ORIGIN, ONES, NO_COLOR] = [[0, 0, 0], [1, 1, 1], [0, 0, 0, 0]];
 
 /** A matrix that takes every point out of the shadow map, where everything is lit. */
 const NOWHERE = scaleThenMove([-9, -9, 0], [0, 0, 0]);
@@ -69,6 +74,10 @@ export class Renderer {
     /** @type {import("../net/wire.js").Ghost | null} */
     this.ghostWritten = null;
     this.isDirty = true;
+    /** By whether the theme is dark: the uniforms of all programs, which each picture writes in place. @type {Map<boolean, Uniforms>} */
+    this.uniformsByTheme = new Map();
+    /** Those of points. @type {Uniforms} */
+    this.pointUniforms = { u_forward: 0, u_round: 1, u_radius: 0, u_radius_min: 0 };
     /** Parts that have changed since they were uploaded. */
     this.stale = { topology: false, particles: false, marks: false, colliders: true, poles: true };
     this.measure();
@@ -272,49 +281,61 @@ export class Renderer {
     const palette = paletteOf(this.isDark);
     const { up, right, toward } = camera.axes;
     const light = normalize(add(add(scale(up, 0.8), scale(toward, 0.62)), scale(right, -0.5)));
-    const ratio = canvas.height / viewport.height;
     const projection = camera.projection(viewport.width / viewport.height);
     const isFlat = camera.isFlat;
-    const hasSurface = (simulation.scene?.triangleCount ?? 0) > 0;
+    const hasSurface = this.hasSurface();
     const ground = simulation.ground;
     const basis = camera.basis();
     this.lightView = this.viewOfLight(light);
-    return {
-      ...paletteUniforms(this.isDark),
-      u_view_projection: multiply(projection, camera.view()),
-      u_lo: simulation.frame?.lo ?? [0, 0, 0], u_scale: simulation.frame?.scale ?? [1, 1, 1],
-      u_viewport: [canvas.width, canvas.height], u_eye: camera.eye(), u_up: up, u_light: light,
-      // Close enough that a flat cloth is not uniformly lit. The shadow treats the light as distant.
-      u_lamp: addScaled(simulation.middle(), light, simulation.radius() * LAMP_RADII),
-      u_pixels_per_unit: (projection[5] * canvas.height) / 2, u_near: isFlat ? 0 : camera.distance * 0.02,
-      u_paint: this.paint(), u_heat_low: this.coloring.low, u_heat_high: this.coloring.high,
-      u_flat: isFlat ? [...palette.flatSurface, 0.85] : [0, 0, 0, 0],
-      u_stick: isFlat && hasSurface ? palette.flatStick : palette.stick,
-      // A dark ball is invisible on the dark end of the heat map.
-      u_particle: this.toggles.heat && this.toggles.surface && hasSurface ? palette.ring : palette.particle,
-      u_particle_count: simulation.scene?.particleCount ?? 0, u_round: 1, u_opacity: 1, u_forward: 0, u_shadow: 0, u_is_all: 1,
-      u_ground: ground ? [...ground.normal, ground.offset] : [...up, -1e9],
-      u_right: basis.right, u_upward: basis.up, u_is_solid: this.hasEffects() ? 1 : 0,
-      u_thread: (this.buffers?.spacing ?? 1) * THREAD_SPACINGS,
-      u_to_shadow_map: this.lightView?.map ?? NOWHERE, u_texel: this.lightView?.texel ?? 0,
-      ...this.sizes(ratio, hasSurface, isFlat),
-    };
+    const all = this.uniformsByTheme.get(this.isDark) ?? { ...paletteUniforms(this.isDark) };
+    this.uniformsByTheme.set(this.isDark, all);
+    all.u_view_projection = multiply(projection, camera.view());
+    all.u_lo = simulation.frame?.lo ?? ORIGIN;
+    all.u_scale = simulation.frame?.scale ?? ONES;
+    all.u_viewport = [canvas.width, canvas.height];
+    all.u_eye = camera.eye();
+    all.u_up = up;
+    all.u_light = light;
+    // Close enough that a flat cloth is not uniformly lit. The shadow treats the light as distant.
+    all.u_lamp = addScaled(simulation.middle(), light, simulation.radius() * LAMP_RADII);
+    setNumber(all, "u_pixels_per_unit", (projection[5] * canvas.height) / 2);
+    setNumber(all, "u_near", isFlat ? 0 : camera.distance * 0.02);
+    all.u_paint = this.paint();
+    setNumber(all, "u_heat_low", this.coloring.low);
+    setNumber(all, "u_heat_high", this.coloring.high);
+    all.u_flat = isFlat ? [...palette.flatSurface, 0.85] : NO_COLOR;
+    all.u_stick = isFlat && hasSurface ? palette.flatStick : palette.stick;
+    // A dark ball is invisible on the dark end of the heat map.
+    all.u_particle = this.toggles.heat && this.toggles.surface && hasSurface ? palette.ring : palette.particle;
+    all.u_particle_count = simulation.scene?.particleCount ?? 0;
+    all.u_round = 1;
+    setNumber(all, "u_opacity", hasSurface && !isFlat ? 0.75 : 1);
+    all.u_forward = all.u_shadow = 0;
+    all.u_is_all = this.areAllSticksDrawn() ? 1 : 0;
+    all.u_ground = ground ? [...ground.normal, ground.offset] : [...up, -1e9];
+    all.u_right = basis.right;
+    all.u_upward = basis.up;
+    all.u_is_solid = this.hasEffects() ? 1 : 0;
+    setNumber(all, "u_thread", (this.buffers?.spacing ?? 1) * THREAD_SPACINGS);
+    all.u_to_shadow_map = this.lightView?.map ?? NOWHERE;
+    setNumber(all, "u_texel", this.lightView?.texel ?? 0);
+    this.setSizes(all, hasSurface, isFlat);
+    return all;
   }
 
   /** Radii of sticks and points: a fraction of the spacing between particles, but always visible.
-   * @param {number} ratio @param {boolean} hasSurface @param {boolean} isFlat @returns {Uniforms} */
-  sizes(ratio, hasSurface, isFlat) {
-    const { simulation } = this;
+   * @param {Uniforms} all @param {boolean} hasSurface @param {boolean} isFlat */
+  setSizes(all, hasSurface, isFlat) {
+    const { simulation, canvas, viewport } = this;
+    const ratio = canvas.height / viewport.height;
     const spacing = this.buffers?.spacing ?? simulation.radius() * 0.5;
     const count = simulation.scene?.particleCount ?? 0;
     const thick = Math.min(spacing * 0.13, simulation.radius() * (count > FEW_PARTICLES ? 0.006 : 0.02));
-    return {
-      u_radius: hasSurface && !isFlat ? 0 : hasSurface ? thick * 0.5 : thick,
-      u_radius_min: (hasSurface ? 0.6 : 1.1) * ratio,
-      u_point_radius: hasSurface ? 0 : thick * 1.5,
-      u_point_min: (hasSurface ? 1.8 : count < 20 ? 6 : 2.4) * ratio,
-      u_mark_min: (count > 2000 ? 4 : 5.5) * ratio,
-    };
+    setNumber(all, "u_radius", hasSurface && !isFlat ? 0 : hasSurface ? thick * 0.5 : thick);
+    setNumber(all, "u_radius_min", (hasSurface ? 0.6 : 1.1) * ratio);
+    setNumber(all, "u_point_radius", hasSurface ? 0 : thick * 1.5);
+    setNumber(all, "u_point_min", (hasSurface ? 1.8 : count < 20 ? 6 : 2.4) * ratio);
+    setNumber(all, "u_mark_min", (count > 2000 ? 4 : 5.5) * ratio);
   }
 
   /** @param {Uniforms} uniforms */
@@ -380,7 +401,7 @@ export class Renderer {
     this.colliders?.draw(shadow);
     if (this.toggles.surface) this.drawables?.cloth.drawShadow(shadow);
     // The flattening matrix scales w by its last element, and sizes in pixels are divided by w.
-    this.drawSticks(shadow, { u_pixels_per_unit: /** @type {number} */ (uniforms.u_pixels_per_unit) * flattened[15] });
+    this.drawSticks(shadow, { u_pixels_per_unit: /** @type {Float32Array} */ (uniforms.u_pixels_per_unit)[0] * flattened[15] });
     gl.disable(gl.STENCIL_TEST);
   }
 
@@ -404,8 +425,8 @@ export class Renderer {
     if (this.buffers === null || drawables === null) return;
     if (this.toggles.surface) drawables.cloth.draw(uniforms);
     drawables.planks?.draw(uniforms);
-    this.drawSticks(uniforms, { u_forward: 4e-4, u_opacity: this.hasSurface() ? 0.75 : 1 });
-    this.drawPoints(uniforms, { u_forward: 1.2e-3, u_round: 1 });
+    this.drawSticks(uniforms, STICKS.solid);
+    this.drawPoints(uniforms, POINTS.solid);
   }
 
   /** Draws a 2-D scene without a depth test: later layers cover earlier ones. @param {Uniforms} uniforms */
@@ -416,14 +437,18 @@ export class Renderer {
     this.colliders?.draw({ ...uniforms, u_flat: [...palette.collider, 0.55] });
     if (this.buffers === null || drawables === null) return;
     if (this.toggles.surface) drawables.cloth.draw(uniforms);
-    this.drawSticks(uniforms, { u_round: 0.35 });
-    this.drawPoints(uniforms, { u_forward: 0, u_round: 0.6 });
+    this.drawSticks(uniforms, STICKS.flat);
+    this.drawPoints(uniforms, POINTS.flat);
+  }
+
+  /** Sticks that a surface covers are drawn only on request. */
+  areAllSticksDrawn() {
+    return this.toggles.sticks || this.paint() === PAINT.kinds || !this.hasSurface() || !this.toggles.surface;
   }
 
   /** @param {Uniforms} uniforms @param {Uniforms} own uniforms that come before those */
-  drawSticks(uniforms, own = {}) {
-    const isAll = this.toggles.sticks || this.paint() === PAINT.kinds || !this.hasSurface() || !this.toggles.surface;
-    this.drawables?.sticks.draw(uniforms, { ...own, u_is_all: isAll ? 1 : 0 });
+  drawSticks(uniforms, own = STICKS.shadow) {
+    this.drawables?.sticks.draw(uniforms, own);
   }
 
   /** @param {Uniforms} uniforms */
@@ -435,18 +460,22 @@ export class Renderer {
     buffers.ghost.draw(uniforms, buffers.positions, { isFlat, color, forward: isFlat ? 0 : 4e-4 });
   }
 
-  /** @param {Uniforms} uniforms @param {{ u_forward: number, u_round: number }} own uniforms that come before those */
-  drawPoints(uniforms, own) {
-    const { drawables, toggles } = this;
+  /** @param {Uniforms} uniforms @param {{ forward: number, round: number }} style */
+  drawPoints(uniforms, { forward, round }) {
+    const { drawables, toggles, pointUniforms: own } = this;
     if (drawables === null) return;
-    const particles = { ...own, u_radius: uniforms.u_point_radius, u_radius_min: uniforms.u_point_min };
-    if (toggles.particles) drawables.points.draw(drawables.points.particles, uniforms, particles);
-    const marks = { ...particles, u_radius_min: uniforms.u_mark_min, u_forward: own.u_forward * 2 };
+    own.u_forward = forward;
+    own.u_round = round;
+    own.u_radius = uniforms.u_point_radius;
+    own.u_radius_min = uniforms.u_point_min;
+    if (toggles.particles) drawables.points.draw(drawables.points.particles, uniforms, own);
     if (!toggles.pins) return;
-    drawables.points.draw(drawables.points.marks, uniforms, marks);
+    own.u_radius_min = uniforms.u_mark_min;
+    own.u_forward = forward * 2;
+    drawables.points.draw(drawables.points.marks, uniforms, own);
     // A grabbed particle stays visible behind a fold.
     this.gl.disable(this.gl.DEPTH_TEST);
-    drawables.points.draw(drawables.points.grabbed, uniforms, marks);
+    drawables.points.draw(drawables.points.grabbed, uniforms, own);
   }
 
   /** @param {Uniforms} uniforms */

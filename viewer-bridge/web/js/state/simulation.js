@@ -49,6 +49,8 @@ export class Simulation extends Emitter {
     super();
     /** @type {Scene | null} */
     this.scene = null;
+    /** Half the diagonal of the bounding box of its positions. */
+    this.sceneRadius = 1;
     /** @type {Topology | null} */
     this.topology = null;
     /** @type {Frame | null} */
@@ -225,6 +227,7 @@ export class Simulation extends Emitter {
     this.announced = { count: 0, isShown: false };
     this.expectedCuts = [];
     this.scene = scene;
+    this.sceneRadius = radiusOf(scene);
     this.topology = new Topology(scene);
     this.frame = null;
     this.torn = [];
@@ -318,8 +321,7 @@ export class Simulation extends Emitter {
 
   /** Half the diagonal of the bounding box of the scene's positions. */
   radius() {
-    if (this.scene === null || this.scene.particleCount === 0) return 1;
-    return Math.max(length(subtract(this.scene.max, this.scene.min)) / 2, 1e-3);
+    return this.sceneRadius;
   }
 
   /** The center of the bounding box of the scene's positions. @returns {Vec3} */
@@ -414,6 +416,9 @@ export class Simulation extends Emitter {
     }
   }
 }
+
+/** Half the diagonal of the bounding box of a scene's positions. @param {import("../net/wire.js").Scene} scene */
+const radiusOf = (scene) => (scene.particleCount === 0 ? 1 : Math.max(length(subtract(scene.max, scene.min)) / 2, 1e-3));
 
 /** @param {Collider} one @param {Vec3} up @returns {Plane[]} */
 function floorsOf(one, up) {

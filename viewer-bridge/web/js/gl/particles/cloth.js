@@ -185,17 +185,17 @@ export class Cloth {
     this.count = all.length;
   }
 
-  /** @param {Record<string, number | number[]>} uniforms */
+  /** @param {import("../context.js").Uniforms} uniforms */
   draw(uniforms) {
     this.drawWith(this.program, uniforms);
   }
 
-  /** @param {Record<string, number | number[]>} uniforms */
+  /** @param {import("../context.js").Uniforms} uniforms */
   drawShadow(uniforms) {
     this.drawWith(this.shadow, uniforms);
   }
 
-  /** @param {Program} program @param {Record<string, number | number[]>} uniforms */
+  /** @param {Program} program @param {import("../context.js").Uniforms} uniforms */
   drawWith(program, uniforms) {
     if (this.count === 0) return;
     const { gl } = this;

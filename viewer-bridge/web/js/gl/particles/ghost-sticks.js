@@ -43,7 +43,7 @@ export class GhostSticks {
   }
 
   /** Draws over the picture. Afterwards, the positions are those of `others` again.
-   * @param {Record<string, number | number[]>} uniforms @param {ArrayTexture} others @param {{ isFlat: boolean, color: number[], forward: number }} style */
+   * @param {import("../context.js").Uniforms} uniforms @param {ArrayTexture} others @param {{ isFlat: boolean, color: number[], forward: number }} style */
   draw(uniforms, others, { isFlat, color, forward }) {
     const { gl } = this;
     const ghost = { u_lo: [0, 0, 0], u_scale: [1, 1, 1], u_paint: PAINT.off, u_is_all: 1, u_is_solid: 0, u_radius: 0, u_round: 0, u_stick: color, u_stick_faint: color, u_forward: forward };

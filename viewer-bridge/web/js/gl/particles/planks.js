@@ -110,7 +110,7 @@ export class Planks {
     this.count = whole.length;
   }
 
-  /** @param {Record<string, number | number[]>} uniforms */
+  /** @param {import("../context.js").Uniforms} uniforms */
   draw(uniforms) {
     if (this.count === 0) return;
     const { gl } = this;

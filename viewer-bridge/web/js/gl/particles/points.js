@@ -81,7 +81,7 @@ export class Points {
     this.grabbed = new PointList(gl);
   }
 
-  /** @param {PointList} list @param {Record<string, number | number[]>} uniforms @param {Record<string, number | number[]>} own uniforms that come before those */
+  /** @param {PointList} list @param {import("../context.js").Uniforms} uniforms @param {import("../context.js").Uniforms} own uniforms that come before those */
   draw(list, uniforms, own) {
     if (list.count === 0) return;
     const { gl } = this;

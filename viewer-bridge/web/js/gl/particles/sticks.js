@@ -205,7 +205,7 @@ export class Sticks {
     gl.bufferSubData(gl.ARRAY_BUFFER, 0, this.words);
   }
 
-  /** @param {Record<string, number | number[]>} uniforms @param {Record<string, number | number[]>} [own] uniforms that come before those */
+  /** @param {import("../context.js").Uniforms} uniforms @param {import("../context.js").Uniforms} [own] uniforms that come before those */
   draw(uniforms, own) {
     if (this.drawn.length === 0) return;
     const { gl } = this;
