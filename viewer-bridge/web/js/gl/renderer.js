@@ -38,7 +38,7 @@ const COLLIDER_BEHIND = { slopes: 1, units: 500 };
 /** Scenes with more particles than a ragdoll are drawn with thinner sticks. */
 const FEW_PARTICLES = 60;
 
-/** How far sticks and points come forward, in depth, and how round they look. A new object in each picture would be garbage. */
+/** Depth by which sticks and points come forward, and their roundness. A new object in each picture would be garbage. */
 const STICKS = { solid: { u_forward: 4e-4 }, flat: { u_round: 0.35 }, shadow: {} };
 const POINTS = { solid: { forward: 1.2e-3, round: 1 }, flat: { forward: 0, round: 0.6 } };
 const [ORIGIN, ONES, NO_COLOR] = [[0, 0, 0], [1, 1, 1], [0, 0, 0, 0]];
