@@ -60,7 +60,8 @@ impl ContentSelection {
         Topic::Particles,
     ];
 
-    /// Leaves out topics of [`ContentSelection::OPTIONAL`], and all snapshots without a keyframe but every n-th.
+    /// Leaves out topics of [`ContentSelection::OPTIONAL`], and all snapshots without a keyframe but every n-th
+    /// and the last one.
     ///
     /// # Panics
     /// If another topic is left out.
@@ -120,7 +121,8 @@ impl ContentSelection {
         !self.left_out[topic.index()]
     }
 
-    /// Returns `true` for the number of a snapshot that is recorded, whether it has a keyframe or not.
+    /// Returns `true` for the number of a snapshot that is recorded, whether it has a keyframe or not, and whether
+    /// it is the last one or not.
     pub fn has_snapshot(&self, index: u32) -> bool {
         index.is_multiple_of(self.every.get())
     }

@@ -34,8 +34,8 @@ use crate::store::{Location, ParticleStore, Paths, Progress};
 /// Pairs within this number of contact distances at the start of the stage take part in it, because
 /// another contact may push them together.
 const REACH: f32 = 1.1;
-/// Distance by which particles may leave their paths, in contact distances. A larger one finds more candidates, a
-/// smaller one finds them more often. No bit depends on it.
+/// Distance by which two particles may come nearer than on their paths, in contact distances: each may leave its own by
+/// half of it. A larger one finds more candidates, a smaller one finds them more often. No bit depends on it.
 const PARTICLES_MARGIN: f32 = 0.25;
 /// The same where cloths touch as surfaces. There, candidates are found at the start of the paths, so bits depend on it.
 const SURFACES_MARGIN: f32 = 0.2;
@@ -48,7 +48,7 @@ const CANDIDATES_PER_PARTICLE: usize = 8;
 pub(crate) struct ParticleContacts {
     /// Contact distance of all pairs that are not near at load; 0 while contacts are off.
     thickness: f32,
-    /// Distance by which candidates may leave their paths before they are found anew.
+    /// Distance by which two particles may come nearer than on their paths before candidates are found anew.
     margin: f32,
     /// By slot: the particle.
     particles: Vec<u32>,
@@ -382,6 +382,38 @@ mod tests {
                     assert_eq!(hash, expected, "{rate_hz} {kernels:?} {margin}");
                 }
             }
+        }
+    }
+
+    /// Three tiles of particles at rest, 10 m apart. In the first two of them, two particles meet head on late in the
+    /// step. In the first, another one is stopped by the floor before, so its tile is searched again.
+    #[test]
+    fn particles_meet_late_in_a_step_whether_others_have_left_their_paths_before_or_not() {
+        let particle = |x: u32, place: u32| match (x, place) {
+            (0 | 1, 0) => ([-0.08, 0.0, 0.0], [5, 0]),
+            (0 | 1, 1) => ([0.08, 0.0, 0.0], [-5, 0]),
+            (0, 2) => ([0.0, -0.97, 0.0], [0, -10]),
+            _ => ([0.0, 0.0, 0.2 * f64::from(place)], [0, 0]),
+        };
+        let mut text = "version = 1\ngravity = [0, 0, 0]\n[solver]\nrate_hz = 60\nsubsteps = 16\n\
+            [contact]\nmode = \"particles\"\nthickness = 0.02\n\
+            [[collider]]\nshape = \"plane\"\nnormal = [0, 1, 0]\noffset = -1\n"
+            .to_owned();
+        for index in 0..48 {
+            let ([x, y, z], [vx, vy]) = particle(index / 16, index % 16);
+            let x = x + f64::from(10 * (index / 16));
+            text +=
+                &format!("[[particle]]\nposition = [{x}, {y}, {z}]\nvelocity = [{vx}, {vy}, 0]\n");
+        }
+        let mut solver = Solver::new(&Scene::from_toml(&text, "test").unwrap());
+        solver.step();
+        let tiles = &solver.particle_contacts.particles;
+        assert!(tiles[..16].iter().all(|particle| *particle < 16), "another tile");
+        let velocity = |index: usize| solver.particles()[index].velocity;
+        assert_eq!(velocity(2), [0.0; 3], "not stopped by the floor");
+        for pair in [[0, 1], [16, 17]] {
+            let [left, right] = pair.map(|index| velocity(index)[0]);
+            assert!(left.abs() < 1e-3 && right.abs() < 1e-3, "{pair:?}: {left} {right}");
         }
     }
 }

@@ -19,8 +19,8 @@ pub(crate) struct SelectionArgs {
     /// topic name it
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = optional_topic)]
     exclude: Vec<Topic>,
-    /// Record every N-th snapshot, and those with a keyframe. Commands and tears between them are
-    /// recorded, so the file can still be verified
+    /// Record every N-th snapshot, those with a keyframe, and the last one. Commands and tears between
+    /// them are recorded, so the file can still be verified
     #[arg(long, value_name = "N", default_value = "1", allow_hyphen_values = true,
         value_parser = period)]
     every: NonZeroU32,

@@ -175,8 +175,8 @@ impl TileTree {
 
     /// Passes every pair of particles whose straight paths come nearer than the query's distance to
     /// `accept`, as slots in ascending order, if the tile of one of them has strays. The order of two pairs depends
-    /// only on the tree, not on the other pairs. `except` leaves pairs out: for two tiles, it has a bit for each particle of the second one that a
-    /// particle of the first one leaves out.
+    /// only on the tree, not on the other pairs. `except` leaves pairs out: for two tiles, it has a bit for each
+    /// particle of the second one that a particle of the first one leaves out.
     pub(super) fn search(
         &mut self,
         query: Query,
