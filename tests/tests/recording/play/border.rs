@@ -1,5 +1,5 @@
-//! A replay loses nothing at the border of two files that leave out snapshots: the last messages of a file
-//! follow its last snapshot.
+//! A replay loses nothing at the border of two files that leave out snapshots. Where a node publishes only
+//! some, the last messages of a file follow its last snapshot.
 
 use std::path::Path;
 use std::time::Duration;
@@ -149,7 +149,10 @@ fn changes_between_the_last_snapshot_of_a_file_and_the_first_of_the_next_are_pla
         let sandbox = Sandbox::new();
         let files = split(&sandbox, node_args, recorder_args);
         let (recorded, trailing_count) = read(&files);
-        assert!(trailing_count > 20, "{trailing_count}: there are outcomes between the files");
+        if recorder_args.is_empty() {
+            assert!(trailing_count > 20, "{trailing_count}: there are outcomes between the files");
+        }
+        assert!(recorded.last().unwrap().outcomes.len() > 20, "there are commands");
         let shown = played(&sandbox, &files);
         assert_eq!(shown.len(), recorded.len(), "each snapshot");
         for (shown, recorded) in shown.iter().zip(&recorded) {
