@@ -12,9 +12,6 @@ const VERTICES = 9;
 const VERTEX = `${HEADER}
 layout(location = 0) in vec3 a_from;
 layout(location = 1) in vec3 a_to;
-uniform mat4 u_view_projection;
-uniform vec2 u_viewport;
-uniform float u_near;
 uniform float u_width;
 uniform float u_rim;
 vec2 shape(float long_px) {
@@ -85,13 +82,12 @@ export class Arrows {
   }
 
   /** Draws each arrow on a rim, so that it is visible on any background.
-   * @param {import("./context.js").Uniforms} uniforms @param {{ width: number, rim: number, color: number[], rimColor: number[] }} style sizes in device pixels */
-  draw(uniforms, { width, rim, color, rimColor }) {
+   * @param {{ width: number, rim: number, color: number[], rimColor: number[] }} style sizes in device pixels */
+  draw({ width, rim, color, rimColor }) {
     if (this.count === 0) return;
     const { gl } = this;
     gl.disable(gl.DEPTH_TEST);
     this.program.use();
-    this.program.set(uniforms);
     gl.bindVertexArray(this.vao);
     for (const pass of [{ u_rim: rim, u_color: rimColor }, { u_rim: 0, u_color: color }]) {
       this.program.set({ u_width: width, ...pass });

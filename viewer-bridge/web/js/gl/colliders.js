@@ -2,12 +2,12 @@
 
 import { add, addScaled, frameOf, length, normalize, rotate, scale, subtract, tangents } from "../geometry/math.js";
 import { Program, UNITS } from "./context.js";
-import { BLUR, HEADER, LIGHT, SCREEN, SHADOW, sunlight } from "./shaders.js";
+import { BLUR, HEADER, LIGHT, SCREEN, sunlight } from "./shaders.js";
 import { VERTEX_FLOATS, ball, cube, cubeEdges, facets } from "./solids.js";
 
 /** @typedef {import("../geometry/math.js").Vec3} Vec3 */
 /** @typedef {import("../net/wire.js").Collider} Collider */
-/** @typedef {import("./context.js").Uniforms} Uniforms */
+/** @typedef {import("./styles.js").ColliderStyle} ColliderStyle */
 /** A solid in the scene: `solid` is a number for the mesh of that collider, `shape` has its axes scaled by its size, `turn` its unit axes for normals, `a` and `b` are the ends of its axis.
  * @typedef {{ solid: "ball" | "cube" | "edges" | number, shape: number[], turn: number[], a: Vec3, b: Vec3 }} Placed */
 
@@ -16,11 +16,10 @@ import { VERTEX_FLOATS, ball, cube, cubeEdges, facets } from "./solids.js";
 /** Extent of half planes in 2-D, in radii of the scene. */
 const HALF_PLANE_RADII = 200;
 
-const VERTEX = `${HEADER}${SHADOW}
+const VERTEX = `${HEADER}
 layout(location = 0) in vec3 a_position;
 layout(location = 1) in vec3 a_normal;
 layout(location = 2) in float a_end;
-uniform mat4 u_view_projection;
 uniform mat4 u_shape;
 uniform mat4 u_turn;
 uniform vec3 u_a;
@@ -37,12 +36,11 @@ void main() {
 }
 `;
 
-const fragment = (/** @type {boolean} */ hasEffects) => `${HEADER}${SHADOW}${SCREEN}${LIGHT}${sunlight(hasEffects)}
+const fragment = (/** @type {boolean} */ hasEffects) => `${HEADER}${SCREEN}${LIGHT}${sunlight(hasEffects)}
 in vec3 v_position;
 in vec3 v_normal;
 in float v_height;
 uniform vec3 u_collider;
-uniform vec3 u_eye;
 uniform vec4 u_flat;
 void main() {
   if (u_shadow > 0.0) {
@@ -157,24 +155,23 @@ export class Colliders {
     return { vao, buffers, count: indices === null ? vertices.length / VERTEX_FLOATS : indices.length };
   }
 
-  /** @param {Uniforms} uniforms */
-  draw(uniforms) {
-    this.drawAll(this.placed, uniforms);
-    if (this.poles.length > 0) this.drawAll(this.poles, { ...uniforms, u_collider: uniforms.u_pole });
+  /** @param {ColliderStyle} style */
+  draw(style) {
+    this.drawAll(this.placed, style.collider, style);
+    this.drawAll(this.poles, style.pole, style);
   }
 
-  /** @param {Placed[]} bodies @param {Uniforms} uniforms */
-  drawAll(bodies, uniforms) {
+  /** @param {Placed[]} bodies @param {number[]} color @param {ColliderStyle} style */
+  drawAll(bodies, color, { flat, edges }) {
     if (bodies.length === 0) return;
     const { gl } = this;
     this.program.use();
-    this.program.set(uniforms);
     for (const { solid, shape, turn, a, b } of bodies) {
       const isEdges = solid === "edges";
       const loaded = typeof solid === "number" ? this.loadedMeshes.get(solid) : this.solids[solid];
       if (loaded === undefined) continue;
-      if (isEdges && /** @type {number} */ (uniforms.u_shadow) > 0) continue;
-      this.program.set({ u_shape: shape, u_turn: turn, u_a: a, u_b: b, ...(isEdges ? { u_flat: [.../** @type {number[]} */ (uniforms.u_collider), 1] } : { u_flat: uniforms.u_flat }) });
+      if (isEdges && edges === null) continue;
+      this.program.set({ u_shape: shape, u_turn: turn, u_a: a, u_b: b, u_collider: color, u_flat: (isEdges ? edges : null) ?? flat });
       gl.bindVertexArray(loaded.vao);
       if (isEdges) gl.drawArrays(gl.LINES, 0, loaded.count);
       else if (typeof solid === "number") gl.drawArrays(gl.TRIANGLES, 0, loaded.count);

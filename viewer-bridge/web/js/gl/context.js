@@ -1,6 +1,9 @@
 // WebGL2 basics: opening a context, compiling programs, and textures that hold arrays.
 
+import { BLOCK } from "./uniforms.js";
+
 /** @typedef {WebGL2RenderingContext} GL */
+/** Values of plain uniforms by name. @typedef {Record<string, number | number[]>} Uniforms */
 
 /** Texels per row of an array texture; every WebGL2 device supports this width. */
 export const ROW = 1024;
@@ -28,19 +31,10 @@ export function rendererName(gl) {
 /** True for a renderer without a graphics processor, for which effects are too slow. @param {string} name */
 export const isSoftware = (name) => /swiftshader|llvmpipe|lavapipe|softpipe|software|basic render/i.test(name);
 
-/** Values of uniforms by name. @typedef {Record<string, number | number[] | Float32Array>} Uniforms */
-
 /** @type {Uniforms} */
 const NONE = {};
 
-/** Writes a fraction in place: as a number, each read of it for a program would allocate. @param {Uniforms} all @param {string} name @param {number} value */
-export function setNumber(all, name, value) {
-  const place = all[name];
-  if (place instanceof Float32Array) place[0] = value;
-  else all[name] = Float32Array.of(value);
-}
-
-/** A linked program, with the locations of its uniforms. */
+/** A linked program, with the locations of its plain uniforms. The shared ones are in a block (uniforms.js). */
 export class Program {
   /** @param {GL} gl @param {string} vertex @param {string} fragment */
   constructor(gl, vertex, fragment) {
@@ -57,6 +51,9 @@ export class Program {
       if (uniform && location) this.locations.set(uniform.name.replace("[0]", ""), location);
     }
     this.names = [...this.locations.keys()];
+    const block = gl.getUniformBlockIndex(this.handle, BLOCK.name);
+    // A program that uses no member may have no block.
+    if (block !== gl.INVALID_INDEX) gl.uniformBlockBinding(this.handle, block, BLOCK.binding);
   }
 
   use() {
@@ -74,7 +71,6 @@ export class Program {
       if (value === undefined) continue;
       const location = this.locations.get(name) ?? null;
       if (typeof value === "number") gl.uniform1f(location, value);
-      else if (value.length === 1) gl.uniform1fv(location, value);
       else if (value.length === 2) gl.uniform2fv(location, value);
       else if (value.length === 3) gl.uniform3fv(location, value);
       else if (value.length === 4) gl.uniform4fv(location, value);

@@ -22,7 +22,6 @@ void main() {
 `;
 
 const GROUND_VERTEX = `${HEADER}${CORNER}
-uniform mat4 u_view_projection;
 uniform vec3 u_middle;
 uniform vec3 u_along;
 uniform vec3 u_across;
@@ -42,7 +41,7 @@ const groundFragment = (/** @type {boolean} */ hasEffects) => `${HEADER}${SCREEN
 in vec2 v_at;
 in vec3 v_position;
 uniform vec3 u_normal;
-uniform float u_shadow;
+uniform float u_darkness;
 uniform vec2 u_shift;
 uniform vec3 u_fill;
 uniform vec3 u_line;
@@ -61,7 +60,7 @@ void main() {
   float fade = 1.0 - smoothstep(0.08, 1.0, length(v_at) / u_size);
   float line = u_contrast * max(lines(u_spacing * 10.0), lines(u_spacing) * 0.5);
   o_color = screen(mix(u_fill, u_line, line), fade * fade);
-  o_color.rgb *= 1.0 - u_shadow * (1.0 - sunlight(v_position, u_normal, ${BLUR.ground}));
+  o_color.rgb *= 1.0 - u_darkness * (1.0 - sunlight(v_position, u_normal, ${BLUR.ground}));
 }
 `;
 

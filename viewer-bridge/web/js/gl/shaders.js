@@ -1,19 +1,18 @@
 // GLSL shared by all programs: particle positions by index, the heat ramp, lighting.
 
 import { HEAT_STOPS } from "./theme.js";
+import { BLOCK_SOURCE } from "./uniforms.js";
 
-/** Both stages of a program need equal precisions, or the program does not link. */
+/** The version, the precisions, and the shared uniforms. Both stages of a program need equal precisions, or it does not link. */
 export const HEADER = `#version 300 es
 precision highp float;
 precision highp int;
 precision highp usampler2D;
-`;
+${BLOCK_SOURCE}`;
 
 /** Defines position(particle), for positions as 16-bit integers or as floats. @param {boolean} isQuantised */
 export const positionReader = (isQuantised) => `
 uniform highp ${isQuantised ? "usampler2D" : "sampler2D"} u_positions;
-uniform vec3 u_lo;
-uniform vec3 u_scale;
 ivec2 texel(uint index) { return ivec2(int(index & 1023u), int(index >> 10u)); }
 vec3 position(uint particle) { return u_lo + u_scale * vec3(texelFetch(u_positions, texel(particle), 0).xyz); }
 `;
@@ -23,11 +22,6 @@ export const PAINT = Object.freeze({ off: 0, constraints: 1, speeds: 2, kinds: 3
 
 /** Defines heat(value), the colour of a value between the ends of the scale, and that of an unknown one. */
 export const HEAT = `
-uniform float u_paint;
-uniform float u_heat_low;
-uniform float u_heat_high;
-uniform vec3 u_unknown;
-uniform vec3 u_heat_stops[${HEAT_STOPS.length}];
 vec3 heat(float value, float known) {
   if (known < 0.5) return u_unknown;
   float at = clamp((value / known - u_heat_low) / (u_heat_high - u_heat_low), 0.0, 1.0) * ${(HEAT_STOPS.length - 1).toFixed(1)};
@@ -49,11 +43,6 @@ float value_of(float span, float rest_length, float gain) {
 /** Defines lit(base, at, normal, to_eye, sheen, sun): a soft sky, one key light with a wrapped edge, light through thin cloth, a rim.
  * `sun` is the part of the key light that arrives, 0..=1. */
 export const LIGHT = `
-uniform vec3 u_up;
-uniform vec3 u_lamp;
-uniform vec3 u_sky;
-uniform vec3 u_bounce;
-uniform float u_key;
 vec3 lit(vec3 base, vec3 at, vec3 normal, vec3 to_eye, float sheen, float sun) {
   vec3 to_light = normalize(u_lamp - at);
   vec3 around = mix(u_bounce, u_sky, 0.5 + 0.5 * dot(normal, u_up));
@@ -85,8 +74,6 @@ const TAPS = 14;
  */
 export const sunlight = (hasEffects) => (hasEffects ? `
 uniform highp sampler2DShadow u_shadow_map;
-uniform mat4 u_to_shadow_map;
-uniform float u_texel;
 float sunlight(vec3 at, vec3 normal, float blur) {
   // A point a little in front of the surface, so that no surface lies in its own shadow.
   vec3 place = (u_to_shadow_map * vec4(at + normal * u_texel * (1.0 + 0.5 * blur), 1.0)).xyz;
@@ -107,12 +94,6 @@ float sunlight(vec3 at, vec3 normal, float blur) {
 
 /** Edges of shadows in texels: on the scene itself, and on the ground. */
 export const BLUR = { scene: "2.5", ground: "9.0" };
-
-/** Uniforms of the shadow pass. Anything below the ground casts no shadow. */
-export const SHADOW = `
-uniform vec4 u_ground;
-uniform float u_shadow;
-`;
 
 /** Defines corner(): a corner of a quad, from gl_VertexID 0..=3 of a triangle strip. */
 export const CORNER = "vec2 corner() { return vec2(float(gl_VertexID & 1), float(gl_VertexID >> 1)) * 2.0 - 1.0; }\n";

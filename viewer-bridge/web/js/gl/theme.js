@@ -58,12 +58,12 @@ const DARK = {
   flatSurface: linear("#41242a"), flatStick: linear("#e0737c"), unknown: linear(UNKNOWN_COLORS.dark), wood: linear("#a97d50"), pole: linear("#9aa4af"), body: linear("#a3b1c1"), ghost: linear(GHOST_COLORS.dark), ...MARKS,
 };
 
-/** The uniforms of the shaders that depend only on the palette. @param {Palette} palette @returns {Record<string, number | number[]>} */
+/** The shared uniforms that depend only on the palette. @param {Palette} palette */
 const uniformsOf = (palette) => ({
   u_sky: palette.sky, u_bounce: palette.bounce, u_key: palette.key, u_unknown: palette.unknown, u_front: palette.front, u_back: palette.back,
-  u_stick_faint: palette.stickFaint, u_ring: palette.ring, u_collider: palette.collider, u_wood: palette.wood, u_pole: palette.pole, u_body: palette.body,
-  u_marks: [...palette.pin, ...palette.anchor, ...palette.grabbed, ...palette.frozen],
-  u_heat_stops: HEAT_STOPS.flatMap((hex) => linear(hex)), u_kinds: KIND_COLORS.flatMap((hex) => linear(hex)),
+  u_stick_faint: palette.stickFaint, u_ring: palette.ring, u_wood: palette.wood, u_body: palette.body,
+  u_marks: [palette.pin, palette.anchor, palette.grabbed, palette.frozen],
+  u_heat_stops: HEAT_STOPS.map(linear), u_kinds: KIND_COLORS.map(linear),
 });
 const UNIFORMS = { light: uniformsOf(LIGHT), dark: uniformsOf(DARK) };
 

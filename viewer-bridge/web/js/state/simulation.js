@@ -49,8 +49,8 @@ export class Simulation extends Emitter {
     super();
     /** @type {Scene | null} */
     this.scene = null;
-    /** Half the diagonal of the bounding box of its positions. */
-    this.sceneRadius = 1;
+    /** The bounding sphere of its positions: pictures ask for it many times. */
+    this.extent = { radius: 1, middle: /** @type {Vec3} */ ([0, 0, 0]) };
     /** @type {Topology | null} */
     this.topology = null;
     /** @type {Frame | null} */
@@ -227,7 +227,7 @@ export class Simulation extends Emitter {
     this.announced = { count: 0, isShown: false };
     this.expectedCuts = [];
     this.scene = scene;
-    this.sceneRadius = radiusOf(scene);
+    this.extent = extentOf(scene);
     this.topology = new Topology(scene);
     this.frame = null;
     this.torn = [];
@@ -321,12 +321,12 @@ export class Simulation extends Emitter {
 
   /** Half the diagonal of the bounding box of the scene's positions. */
   radius() {
-    return this.sceneRadius;
+    return this.extent.radius;
   }
 
-  /** The center of the bounding box of the scene's positions. @returns {Vec3} */
+  /** The center of the bounding box of the scene's positions. Do not change it. */
   middle() {
-    return this.scene === null ? [0, 0, 0] : scale(add(this.scene.min, this.scene.max), 0.5);
+    return this.extent.middle;
   }
 
   /** Shows an applied pin at once: a paused node publishes it only with its next step. @param {number} particle @param {boolean} isPinned */
@@ -417,8 +417,10 @@ export class Simulation extends Emitter {
   }
 }
 
-/** Half the diagonal of the bounding box of a scene's positions. @param {import("../net/wire.js").Scene} scene */
-const radiusOf = (scene) => (scene.particleCount === 0 ? 1 : Math.max(length(subtract(scene.max, scene.min)) / 2, 1e-3));
+/** @param {Scene} scene */
+function extentOf({ particleCount, min, max }) {
+  return { radius: particleCount === 0 ? 1 : Math.max(length(subtract(max, min)) / 2, 1e-3), middle: scale(add(min, max), 0.5) };
+}
 
 /** @param {Collider} one @param {Vec3} up @returns {Plane[]} */
 function floorsOf(one, up) {

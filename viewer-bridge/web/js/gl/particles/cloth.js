@@ -2,12 +2,11 @@
 // triangles around it, so after a tear the CPU only lists the triangles that are gone.
 
 import { Program, UNITS } from "../context.js";
-import { BLUR, HEADER, HEAT, LIGHT, PAINT, SCREEN, SHADOW, VALUES, positionReader, sunlight } from "../shaders.js";
+import { BLUR, HEADER, HEAT, LIGHT, PAINT, SCREEN, VALUES, positionReader, sunlight } from "../shaders.js";
 
 /** Defines surface_position(vertex, particle): a vertex is a particle, or moves with one (state/splits.js). */
 const SURFACE_POSITION = `
 uniform usampler2D u_splits;
-uniform float u_particle_count;
 vec3 surface_position(uint vertex, out uint particle) {
   particle = vertex;
   uint count = uint(u_particle_count);
@@ -43,7 +42,6 @@ const NO_FLAT_PLACE = "vec2 flat_place(uint vertex) { return vec2(0.0); }\n";
  * fade where the surface could not be laid flat.
  */
 const WEAVE = `
-uniform float u_thread;
 float fading(vec2 cell) {
   vec2 width = fwidth(cell);
   return 1.0 - smoothstep(0.25, 0.6, max(width.x, width.y));
@@ -72,7 +70,6 @@ const NO_WEAVE = "float weave(vec2 place, vec3 at) { return 1.0; }\n";
 const NORMAL_FROM_FAN = `
 uniform usampler2D u_fan_ranges;
 uniform usampler2D u_fans;
-uniform float u_paint;
 void main() {
   uint particle;
   vec3 surface = surface_position(uint(gl_VertexID), particle);
@@ -101,7 +98,6 @@ void main() {
 
 /** @param {import("../context.js").Variant} variant */
 const vertex = ({ isQuantised, hasEffects }) => `${HEADER}
-uniform mat4 u_view_projection;
 out vec3 v_position;
 out vec3 v_normal;
 out float v_value;
@@ -116,9 +112,6 @@ in vec3 v_normal;
 in float v_value;
 in float v_known;
 in vec2 v_flat_place;
-uniform vec3 u_eye;
-uniform vec3 u_front;
-uniform vec3 u_back;
 uniform vec4 u_flat;
 void main() {
   vec3 base = gl_FrontFacing ? u_front : u_back;
@@ -140,8 +133,7 @@ void main() {
 `;
 
 /** @param {boolean} isQuantised */
-const shadowVertex = (isQuantised) => `${HEADER}${SHADOW}
-uniform mat4 u_view_projection;
+const shadowVertex = (isQuantised) => `${HEADER}
 out float v_height;
 ${positionReader(isQuantised)}${SURFACE_POSITION}
 void main() {
@@ -152,7 +144,7 @@ void main() {
 }
 `;
 
-const SHADOW_FRAGMENT = `${HEADER}${SHADOW}${SCREEN}
+const SHADOW_FRAGMENT = `${HEADER}${SCREEN}
 in float v_height;
 void main() {
   if (v_height < 0.0) discard;
@@ -185,22 +177,21 @@ export class Cloth {
     this.count = all.length;
   }
 
-  /** @param {import("../context.js").Uniforms} uniforms */
-  draw(uniforms) {
-    this.drawWith(this.program, uniforms);
+  /** @param {import("../context.js").Uniforms} style */
+  draw(style) {
+    this.drawWith(this.program, style);
   }
 
-  /** @param {import("../context.js").Uniforms} uniforms */
-  drawShadow(uniforms) {
-    this.drawWith(this.shadow, uniforms);
+  drawShadow() {
+    this.drawWith(this.shadow, {});
   }
 
-  /** @param {Program} program @param {import("../context.js").Uniforms} uniforms */
-  drawWith(program, uniforms) {
+  /** @param {Program} program @param {import("../context.js").Uniforms} style */
+  drawWith(program, style) {
     if (this.count === 0) return;
     const { gl } = this;
     program.use();
-    program.set(uniforms);
+    program.set(style);
     gl.bindVertexArray(this.vao);
     gl.drawElements(gl.TRIANGLES, this.count, gl.UNSIGNED_INT, 0);
     gl.bindVertexArray(null);

@@ -4,12 +4,16 @@ import { sameNumbers } from "../../geometry/math.js";
 import { CONSTRAINT } from "../../net/wire.js";
 import { STICK, drawnSticks } from "../../state/topology.js";
 import { ArrayTexture, UNITS, layouts } from "../context.js";
-import { PAINT } from "../shaders.js";
+import { STICKS } from "../styles.js";
 
 /** @typedef {import("./sticks.js").Sticks} Sticks */
 
-/** Opacity in front of everything else, and behind something. */
-const OPACITY = { visible: 0.9, hidden: 0.25 };
+/** Thin flat sticks of all listed constraints. */
+const THIN = { u_is_all: 1, u_radius: 0, u_round: 0 };
+/** In front of everything else, behind something, and in 2-D. */
+const VISIBLE = { ...THIN, u_forward: STICKS.solid.u_forward, u_opacity: 0.9 };
+const HIDDEN = { ...VISIBLE, u_opacity: 0.25 };
+const FLAT = { ...VISIBLE, u_forward: 0 };
 
 /** The constraints that show the shape: structural ones, or all if there are none. @param {import("../../net/wire.js").Scene} scene @param {number} limit */
 function ghostSticks(scene, limit) {
@@ -43,20 +47,19 @@ export class GhostSticks {
   }
 
   /** Draws over the picture. Afterwards, the positions are those of `others` again.
-   * @param {import("../context.js").Uniforms} uniforms @param {ArrayTexture} others @param {{ isFlat: boolean, color: number[], forward: number }} style */
-  draw(uniforms, others, { isFlat, color, forward }) {
+   * @param {import("../context.js").Uniforms} sizes @param {ArrayTexture} others @param {{ isFlat: boolean }} scene */
+  draw(sizes, others, { isFlat }) {
     const { gl } = this;
-    const ghost = { u_lo: [0, 0, 0], u_scale: [1, 1, 1], u_paint: PAINT.off, u_is_all: 1, u_is_solid: 0, u_radius: 0, u_round: 0, u_stick: color, u_stick_faint: color, u_forward: forward };
     this.positions.bind();
     if (!isFlat) {
       gl.enable(gl.DEPTH_TEST);
       gl.depthMask(false);
       gl.depthFunc(gl.GREATER);
-      this.sticks.draw(uniforms, { ...ghost, u_opacity: OPACITY.hidden });
+      this.sticks.draw(sizes, HIDDEN);
       gl.depthMask(true);
       gl.depthFunc(gl.LEQUAL);
     }
-    this.sticks.draw(uniforms, { ...ghost, u_opacity: OPACITY.visible });
+    this.sticks.draw(sizes, isFlat ? FLAT : VISIBLE);
     others.bind();
   }
 

@@ -2,7 +2,7 @@
 
 import { STICK } from "../../state/topology.js";
 import { Program, UNITS } from "../context.js";
-import { BLUR, HEADER, LIGHT, SCREEN, SHADOW, positionReader, sunlight } from "../shaders.js";
+import { BLUR, HEADER, LIGHT, SCREEN, positionReader, sunlight } from "../shaders.js";
 import { VERTEX_FLOATS, cube } from "../solids.js";
 
 /** Words per instance: the left ends of the plank, of the one before it and of the one after it. The right ends follow them. */
@@ -13,11 +13,10 @@ const WORDS = 3;
  * fractions of the distance to them, and it extends a little beyond the ropes.
  * @param {boolean} isQuantised
  */
-const vertex = (isQuantised) => `${HEADER}${SHADOW}
+const vertex = (isQuantised) => `${HEADER}
 layout(location = 0) in vec3 a_position;
 layout(location = 1) in vec3 a_normal;
 layout(location = 2) in uvec3 a_lefts;
-uniform mat4 u_view_projection;
 out vec3 v_position;
 out vec3 v_normal;
 out vec2 v_on_board;
@@ -47,14 +46,12 @@ void main() {
 `;
 
 /** Wood: long streaks, and a shade of its own for each board. @param {boolean} hasEffects */
-const fragment = (hasEffects) => `${HEADER}${SHADOW}${SCREEN}${LIGHT}${sunlight(hasEffects)}
+const fragment = (hasEffects) => `${HEADER}${SCREEN}${LIGHT}${sunlight(hasEffects)}
 in vec3 v_position;
 in vec3 v_normal;
 in vec2 v_on_board;
 flat in float v_grain;
 in float v_height;
-uniform vec3 u_wood;
-uniform vec3 u_eye;
 float noise(float x) {
   float first = floor(x);
   vec2 ends = fract(sin(vec2(first, first + 1.0) * 78.233 + v_grain * 9.0) * 43758.5453);
@@ -110,12 +107,10 @@ export class Planks {
     this.count = whole.length;
   }
 
-  /** @param {import("../context.js").Uniforms} uniforms */
-  draw(uniforms) {
+  draw() {
     if (this.count === 0) return;
     const { gl } = this;
     this.program.use();
-    this.program.set(uniforms);
     gl.bindVertexArray(this.vao);
     gl.drawElementsInstanced(gl.TRIANGLES, this.indexCount, gl.UNSIGNED_SHORT, 0, this.count);
     gl.bindVertexArray(null);

@@ -1,7 +1,7 @@
 // Particles as small balls; marks of pinned, anchored, grabbed and frozen particles as discs with a white ring.
 
 import { Program, UNITS } from "../context.js";
-import { HEADER, HEAT, PAINT, SCREEN, SHADOW, VALUES, positionReader } from "../shaders.js";
+import { HEADER, HEAT, PAINT, SCREEN, VALUES, positionReader } from "../shaders.js";
 
 /** Styles of a point, as the shader numbers them. */
 export const POINT = Object.freeze({ particle: 0, pin: 1, anchor: 2, grabbed: 3, frozen: 4 });
@@ -10,11 +10,9 @@ export const POINT = Object.freeze({ particle: 0, pin: 1, anchor: 2, grabbed: 3,
 const WORDS = 2;
 
 /** @param {boolean} isQuantised */
-const vertex = (isQuantised) => `${HEADER}${SHADOW}
+const vertex = (isQuantised) => `${HEADER}
 layout(location = 0) in uint a_particle;
 layout(location = 1) in uint a_style;
-uniform mat4 u_view_projection;
-uniform float u_pixels_per_unit;
 uniform float u_radius;
 uniform float u_radius_min;
 uniform float u_forward;
@@ -22,7 +20,6 @@ flat out uint v_style;
 flat out float v_diameter;
 flat out float v_speed;
 out float v_height;
-uniform float u_paint;
 ${positionReader(isQuantised)}${VALUES}
 void main() {
   vec3 at = position(a_particle);
@@ -38,14 +35,11 @@ void main() {
 }
 `;
 
-const FRAGMENT = `${HEADER}${SHADOW}${SCREEN}${HEAT}
+const FRAGMENT = `${HEADER}${SCREEN}${HEAT}
 flat in uint v_style;
 flat in float v_diameter;
 flat in float v_speed;
 in float v_height;
-uniform vec3 u_particle;
-uniform vec3 u_marks[4];
-uniform vec3 u_ring;
 uniform float u_round;
 void main() {
   vec2 at = gl_PointCoord * 2.0 - 1.0;
@@ -81,12 +75,12 @@ export class Points {
     this.grabbed = new PointList(gl);
   }
 
-  /** @param {PointList} list @param {import("../context.js").Uniforms} uniforms @param {import("../context.js").Uniforms} own uniforms that come before those */
-  draw(list, uniforms, own) {
+  /** @param {PointList} list @param {import("../context.js").Uniforms} sizes @param {import("../context.js").Uniforms} style */
+  draw(list, sizes, style) {
     if (list.count === 0) return;
     const { gl } = this;
     this.program.use();
-    this.program.set(uniforms, own);
+    this.program.set(sizes, style);
     gl.bindVertexArray(list.vao);
     gl.drawArrays(gl.POINTS, 0, list.count);
     gl.bindVertexArray(null);

@@ -4,7 +4,7 @@
 import { CONSTRAINT } from "../../net/wire.js";
 import { STICK } from "../../state/topology.js";
 import { Program, UNITS } from "../context.js";
-import { BLUR, CORNER, HEADER, HEAT, LIGHT, PAINT, SCREEN, SHADOW, VALUES, positionReader, sunlight } from "../shaders.js";
+import { BLUR, CORNER, HEADER, HEAT, LIGHT, PAINT, SCREEN, VALUES, positionReader, sunlight } from "../shaders.js";
 
 /** Words per instance: two ends, rest length and gain as f32 bits, style, radius as a solid body as f32 bits. */
 const WORDS = 6;
@@ -14,10 +14,6 @@ const WORDS = 6;
  * axis in radii. The quad of a stick faces the eye, so its normal follows from both. Defines place(alpha), which sets its depth.
  */
 const ROD = `
-uniform vec3 u_right;
-uniform vec3 u_upward;
-uniform vec3 u_eye;
-uniform vec3 u_body;
 vec3 rod(float t, vec2 aside) {
   vec3 axis = normalize(v_ends[1] - v_ends[0] + vec3(1e-20));
   vec3 at = mix(v_ends[0], v_ends[1], t);
@@ -37,22 +33,16 @@ void place(float alpha) {}
 
 /** Computes the ends in pixels, and the quad around them. Divides by w here, so that interpolation is
  * linear on the screen. Clips an end behind the eye to the near plane. @param {import("../context.js").Variant} variant */
-const vertex = ({ isQuantised }) => `${HEADER}${SHADOW}${CORNER}
+const vertex = ({ isQuantised }) => `${HEADER}${CORNER}
 layout(location = 0) in uvec2 a_ends;
 layout(location = 1) in float a_rest_length;
 layout(location = 2) in uint a_style;
 layout(location = 3) in float a_radius;
 layout(location = 4) in float a_gain;
-uniform float u_paint;
-uniform mat4 u_view_projection;
-uniform vec2 u_viewport;
-uniform float u_pixels_per_unit;
 uniform float u_radius;
 uniform float u_radius_min;
-uniform float u_near;
 uniform float u_forward;
 uniform float u_is_all;
-uniform float u_is_solid;
 flat out vec3 v_ends[2];
 flat out float v_radius;
 out vec2 v_pixel;
@@ -103,7 +93,7 @@ void main() {
 `;
 
 /** @param {import("../context.js").Variant} variant */
-const fragment = ({ hasEffects }) => `${HEADER}${SHADOW}${SCREEN}${HEAT}
+const fragment = ({ hasEffects }) => `${HEADER}${SCREEN}${HEAT}
 flat in vec3 v_ends[2];
 flat in float v_radius;
 in vec2 v_pixel;
@@ -113,9 +103,6 @@ in float v_value;
 flat in float v_known;
 flat in uint v_kind;
 in float v_height;
-uniform vec3 u_stick;
-uniform vec3 u_stick_faint;
-uniform vec3 u_kinds[4];
 uniform float u_round;
 uniform float u_opacity;
 ${hasEffects ? LIGHT + sunlight(true) + ROD : NO_ROD}
@@ -205,12 +192,12 @@ export class Sticks {
     gl.bufferSubData(gl.ARRAY_BUFFER, 0, this.words);
   }
 
-  /** @param {import("../context.js").Uniforms} uniforms @param {import("../context.js").Uniforms} [own] uniforms that come before those */
-  draw(uniforms, own) {
+  /** @param {import("../context.js").Uniforms} sizes @param {import("../context.js").Uniforms} style values that come before those */
+  draw(sizes, style) {
     if (this.drawn.length === 0) return;
     const { gl } = this;
     this.program.use();
-    this.program.set(uniforms, own);
+    this.program.set(sizes, style);
     gl.bindVertexArray(this.vao);
     gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, this.drawn.length);
     gl.bindVertexArray(null);
