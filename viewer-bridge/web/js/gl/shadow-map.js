@@ -1,6 +1,6 @@
 // The shadow map: the depths of the scene as the light sees it. The light counts as distant.
 
-import { add, dot, frameOf, length, multiply, scale, scaleThenMove, subtract, tangents } from "../geometry/math.js";
+import { add, dot, length, multiply, scale, scaleThenMove, subtract, tangents } from "../geometry/math.js";
 import { UNITS } from "./context.js";
 
 /** @typedef {import("../geometry/math.js").Vec3} Vec3 */
@@ -13,26 +13,33 @@ import { UNITS } from "./context.js";
 export const MAP_SIZE = 2048;
 /** Margin around the box, as a fraction of its radius. */
 const MARGIN = 0.02;
+/** From -1..=1 of the picture of the light to 0..=1 of the map. */
+const TO_MAP = scaleThenMove([0.5, 0.5, 0.5], [0.5, 0.5, 0.5]);
 
 /** The view of a distant light onto a box. @param {Vec3} light direction towards the light @param {Box} box @returns {LightView} */
 export function lightView(light, box) {
   const middle = scale(add(box.min, box.max), 0.5);
   const radius = Math.max(length(subtract(box.max, box.min)) / 2, 1e-6) * (1 + MARGIN);
-  const [across, upward] = tangents(light);
-  const axes = [across, upward, scale(light, -1)];
+  const [x, y] = tangents(light);
+  const z = scale(light, -1);
   // Rows of the matrix: the axes of the light, so that the depth grows away from it.
-  const view = frameOf(
-    /** @type {Vec3} */ (axes.map((axis) => axis[0] / radius)), /** @type {Vec3} */ (axes.map((axis) => axis[1] / radius)),
-    /** @type {Vec3} */ (axes.map((axis) => axis[2] / radius)), /** @type {Vec3} */ (axes.map((axis) => -dot(axis, middle) / radius)),
-  );
-  return { clip: view, map: multiply(scaleThenMove([0.5, 0.5, 0.5], [0.5, 0.5, 0.5]), view), texel: (2 * radius) / MAP_SIZE, size: radius };
+  const clip = [
+    x[0] / radius, y[0] / radius, z[0] / radius, 0, x[1] / radius, y[1] / radius, z[1] / radius, 0,
+    x[2] / radius, y[2] / radius, z[2] / radius, 0, -dot(x, middle) / radius, -dot(y, middle) / radius, -dot(z, middle) / radius, 1,
+  ];
+  return { clip, map: multiply(TO_MAP, clip), texel: (2 * radius) / MAP_SIZE, size: radius };
 }
 
 /** The part of a box within a reach of a point, along each axis; null if there is none. @param {Box} box @param {Vec3} middle @param {number} reach @returns {Box | null} */
 export function clipBox({ min, max }, middle, reach) {
-  const low = /** @type {Vec3} */ (min.map((value, axis) => Math.max(value, middle[axis] - reach)));
-  const high = /** @type {Vec3} */ (max.map((value, axis) => Math.min(value, middle[axis] + reach)));
-  return low.every((value, axis) => value <= high[axis]) ? { min: low, max: high } : null;
+  /** @type {Box} */
+  const near = { min: [0, 0, 0], max: [0, 0, 0] };
+  for (let axis = 0; axis < 3; axis++) {
+    near.min[axis] = Math.max(min[axis], middle[axis] - reach);
+    near.max[axis] = Math.min(max[axis], middle[axis] + reach);
+    if (near.min[axis] > near.max[axis]) return null;
+  }
+  return near;
 }
 
 export class ShadowMap {
