@@ -3,10 +3,10 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { Camera } from "../js/geometry/camera.js";
-import { Renderer } from "../js/gl/renderer.js";
-import { facets } from "../js/gl/solids.js";
-import { Simulation } from "../js/state/simulation.js";
+import { Camera } from "../../js/geometry/camera.js";
+import { Renderer } from "../../js/gl/renderer.js";
+import { facets } from "../../js/gl/solids.js";
+import { Simulation } from "../../js/state/simulation.js";
 
 /** A context that draws nothing. Constants are their names, and `live` counts the objects of each kind. */
 function countingContext() {

@@ -2,7 +2,7 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { SharedUniforms, std140 } from "../js/gl/uniforms.js";
+import { SharedUniforms, std140 } from "../../js/gl/uniforms.js";
 
 const offsetsOf = (members) => Object.fromEntries([...std140(members).places].map(([name, { offset }]) => [name, offset]));
 
