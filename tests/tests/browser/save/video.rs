@@ -58,6 +58,34 @@ fn a_video_of_a_paused_scene_shows_the_time_and_has_the_picture_with_its_changes
 
 #[test]
 #[ignore = "needs Chromium"]
+fn a_video_that_a_browser_writes_as_a_stream_has_its_duration() {
+    let rig = Rig::new(&["curtain"], "");
+    let script = json!({ "source": "window.isWebmOnly = true; const isSupported = MediaRecorder.isTypeSupported; \
+        MediaRecorder.isTypeSupported = (type) => type.startsWith('video/webm') && isSupported.call(MediaRecorder, type)" });
+    rig.tab.call("Page.addScriptToEvaluateOnNewDocument", script);
+    // The policy of the page plays no video.
+    rig.tab.call("Page.setBypassCSP", json!({ "enabled": true }));
+    rig.tab.call("Page.reload", json!({}));
+    rig.tab.wait("window.isWebmOnly && window.viewer?.frame >= 0");
+    rig.tab.evaluate(KEEP_FILES);
+    rig.tab.click("#video");
+    rig.tab.wait("document.querySelector('#video-text').textContent >= 'Video 0:02'");
+    rig.tab.click("#video");
+    rig.tab.wait("saved[0]?.name?.endsWith('.webm')");
+    let times = "new Promise((done, fail) => { const video = document.createElement('video'); \
+        let duration; video.muted = true; video.onerror = () => fail(video.error.message); \
+        video.onloadedmetadata = () => { duration = video.duration; video.currentTime = 1.5; }; \
+        video.onseeked = () => { video.onseeked = null; const at = video.currentTime; \
+            video.onended = () => done([duration, at, video.currentTime]); video.play(); }; \
+        video.src = URL.createObjectURL(saved[0].blob); })";
+    let [duration, sought, end]: [f64; 3] =
+        serde_json::from_value(rig.tab.evaluate(times)).unwrap();
+    assert!(duration >= 2.0 && (duration - end).abs() < 0.5, "{duration} s, played to {end} s");
+    assert!((sought - 1.5).abs() < 0.01, "{sought} s");
+}
+
+#[test]
+#[ignore = "needs Chromium"]
 fn a_browser_that_writes_no_video_says_so() {
     let rig = Rig::new(&["curtain"], "");
     let script = json!({ "source": "MediaRecorder.isTypeSupported = () => false" });

@@ -61,6 +61,7 @@ pub(super) const FILES: &[(&str, &[u8])] = files![
     "js/save/recording.js",
     "js/save/video-format.js",
     "js/save/video.js",
+    "js/save/webm-duration.js",
     "js/state/emitter.js",
     "js/state/forces.js",
     "js/state/framing.js",

@@ -4,6 +4,7 @@ import { enable, find } from "../ui/dom.js";
 import { save } from "../ui/save.js";
 import { clock, readableBytes } from "./recording-text.js";
 import { FRAMES_PER_SECOND, SIZE_BYTES_MAX, bitsPerSecond, chooseType, endingOf, videoSize } from "./video-format.js";
+import { HEAD_BYTES, withDuration } from "./webm-duration.js";
 
 /** Time between two parts of the video in ms, so that its size is known while it grows. */
 const PART_MS = 500;
@@ -81,7 +82,13 @@ export class Video {
     this.take = null;
     this.show(0);
     if (take.sizeBytes === 0) return this.fail("the browser has encoded no picture; keep the page visible");
-    save(new Blob(take.parts, { type: take.type }), `${take.name}.${endingOf(take.type)}`);
+    void this.saveVideo(new Blob(take.parts, { type: take.type }), take, (performance.now() - take.begunMs) / 1000);
+  }
+
+  /** @param {Blob} video @param {Take} take @param {number} seconds */
+  async saveVideo(video, { name, type }, seconds) {
+    const ending = endingOf(type);
+    save(ending === "webm" ? await withDurationOf(video, seconds) : video, `${name}.${ending}`);
   }
 
   /** @param {string} reason */
@@ -117,6 +124,12 @@ export class Video {
     const text = `Video ${clock(elapsedMs / 1000)}`;
     if (this.text.textContent !== text) this.text.textContent = text;
   }
+}
+
+/** A WebM video with its duration. @param {Blob} video @param {number} seconds */
+async function withDurationOf(video, seconds) {
+  const head = new Uint8Array(await video.slice(0, HEAD_BYTES).arrayBuffer());
+  return new Blob([...withDuration(head, seconds), video.slice(HEAD_BYTES)], { type: video.type });
 }
 
 /** @param {Take} take */
