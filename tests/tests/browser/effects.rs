@@ -2,8 +2,6 @@
 //! renderer of these tests, and turned on by the address. Each test compares a page with effects and one
 //! without, of the same paused state.
 
-use serde_json::{Value, json};
-
 use crate::support::{Area, Camera, Picture, Rig, Tab, is_cloth};
 
 /// A sheet over a part of another one, and a floor under both.
@@ -198,37 +196,4 @@ fn ropes_and_limbs_have_thickness() {
         let [with, without] = thickness;
         assert!(without > 20 && 10 * with > 13 * without, "{scene}: {with} px, {without} px");
     }
-}
-
-/// Draws a number of pictures at once, without the work of the graphics processor.
-const DRAW: &str = "(count => {
-    const context = WebGL2RenderingContext.prototype;
-    const calls = ['drawArrays', 'drawElements', 'drawArraysInstanced', 'drawElementsInstanced', 'clear'];
-    for (const name of calls) context[name] = () => {};
-    for (let k = 0; k < count; k++) viewer.draw();
-})";
-
-#[test]
-#[ignore = "needs Chromium"]
-fn a_picture_makes_little_garbage() {
-    let Pair { rig, .. } = Pair::new(SHEETS);
-    let tab = &rig.tab;
-    tab.call("HeapProfiler.enable", json!({}));
-    // Compiled code allocates less.
-    tab.evaluate(&format!("{DRAW}(2000)"));
-    tab.call(
-        "HeapProfiler.startSampling",
-        json!({ "samplingInterval": 512, "includeObjectsCollectedByMajorGC": true,
-            "includeObjectsCollectedByMinorGC": true }),
-    );
-    tab.evaluate(&format!("{DRAW}(1000)"));
-    let answer = tab.call("HeapProfiler.stopSampling", json!({}));
-    let bytes = allocated_bytes(&answer["profile"]["head"]) / 1000.0;
-    assert!((500.0..5000.0).contains(&bytes), "{bytes:.0} bytes a picture");
-}
-
-/// Returns the bytes that a function and those that it calls have allocated.
-fn allocated_bytes(node: &Value) -> f64 {
-    let callees = node["children"].as_array().unwrap();
-    node["selfSize"].as_f64().unwrap() + callees.iter().map(allocated_bytes).sum::<f64>()
 }

@@ -11,6 +11,7 @@
 mod access;
 mod carry;
 mod colours;
+mod drawing;
 mod effects;
 mod first_minute;
 mod forces;

@@ -78,6 +78,7 @@ function strokes(one, window) {
     moveTo: (x, y) => paths.push([[left + x, y]]), lineTo: (x, y) => paths.at(-1).push([left + x, y]),
   };
   drawLine(context, one, { cursor: null, ...window }, 10, (value) => value, "");
+  assert.equal(left, 0, "what is drawn next is in its place");
   return paths;
 }
 

@@ -63,7 +63,7 @@ fn a_video_that_a_browser_writes_as_a_stream_has_its_duration() {
     let script = json!({ "source": "window.isWebmOnly = true; const isSupported = MediaRecorder.isTypeSupported; \
         MediaRecorder.isTypeSupported = (type) => type.startsWith('video/webm') && isSupported.call(MediaRecorder, type)" });
     rig.tab.call("Page.addScriptToEvaluateOnNewDocument", script);
-    // The policy of the page plays no video.
+    // The policy of the page forbids it to play a video.
     rig.tab.call("Page.setBypassCSP", json!({ "enabled": true }));
     rig.tab.call("Page.reload", json!({}));
     rig.tab.wait("window.isWebmOnly && window.viewer?.frame >= 0");

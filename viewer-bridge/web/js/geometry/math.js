@@ -52,7 +52,7 @@ export function rotate(q, v) {
 /** @returns {Mat4} */
 export const identity = () => [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
 
-/** a · b, written into `product`. @param {Mat4} a @param {Mat4} b @param {Mat4} product @returns {Mat4} */
+/** a · b, written into `product`, which is neither of them. @param {Mat4} a @param {Mat4} b @param {Mat4} product @returns {Mat4} */
 export function multiply(a, b, product = new Array(16).fill(0)) {
   for (let column = 0; column < 4; column++) {
     for (let row = 0; row < 4; row++) {

@@ -169,9 +169,9 @@ export class Colliders {
     for (const { solid, shape, turn, a, b } of bodies) {
       const isEdges = solid === "edges";
       const loaded = typeof solid === "number" ? this.loadedMeshes.get(solid) : this.solids[solid];
-      if (loaded === undefined) continue;
-      if (isEdges && edges === null) continue;
-      this.program.set({ u_shape: shape, u_turn: turn, u_a: a, u_b: b, u_collider: color, u_flat: (isEdges ? edges : null) ?? flat });
+      const flatColor = isEdges ? edges : flat;
+      if (loaded === undefined || flatColor === null) continue;
+      this.program.set({ u_shape: shape, u_turn: turn, u_a: a, u_b: b, u_collider: color, u_flat: flatColor });
       gl.bindVertexArray(loaded.vao);
       if (isEdges) gl.drawArrays(gl.LINES, 0, loaded.count);
       else if (typeof solid === "number") gl.drawArrays(gl.TRIANGLES, 0, loaded.count);

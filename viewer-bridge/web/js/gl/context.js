@@ -52,7 +52,7 @@ export class Program {
     }
     this.names = [...this.locations.keys()];
     const block = gl.getUniformBlockIndex(this.handle, BLOCK.name);
-    // A program that uses no member may have no block.
+    // Some drivers drop a block that no shader reads.
     if (block !== gl.INVALID_INDEX) gl.uniformBlockBinding(this.handle, block, BLOCK.binding);
   }
 
@@ -60,7 +60,7 @@ export class Program {
     this.gl.useProgram(this.handle);
   }
 
-  /** Sets the uniforms that have a value, choosing the type by its length. Values of `own` come before the others.
+  /** Sets the uniforms that have a value, choosing the type by its length. Values of `own` take precedence.
    * @param {Uniforms} values @param {Uniforms} own */
   set(values, own = NONE) {
     const { gl } = this;

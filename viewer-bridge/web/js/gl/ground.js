@@ -1,8 +1,12 @@
 // The background: a soft backdrop, and a ground. The lines of the ground are computed per pixel, so
 // they neither flicker at the horizon nor end at an edge.
 
+import { addScaled, dot, tangents } from "../geometry/math.js";
 import { Program, UNITS } from "./context.js";
 import { BLUR, CORNER, HEADER, SCREEN, sunlight } from "./shaders.js";
+
+/** Size of the ground, in radii of the scene; it fades out towards its edge. */
+const SIZE_RADII = 6;
 
 const BACKDROP_VERTEX = `${HEADER}${CORNER}
 out vec2 v_at;
@@ -79,9 +83,18 @@ export class Ground {
     this.quad(this.backdrop, uniforms);
   }
 
-  /** @param {import("./context.js").Uniforms} uniforms */
-  draw(uniforms) {
-    this.quad(this.program, uniforms);
+  /** Draws a plane as a patch of ground that fades out, with grid lines at round coordinates.
+   * @param {import("../state/simulation.js").Plane} plane @param {import("../geometry/camera.js").Camera} camera @param {number} sceneRadius @param {import("./theme.js").Palette} palette */
+  drawPlane({ normal, offset }, camera, sceneRadius, palette) {
+    const middle = addScaled(camera.target, normal, offset - dot(normal, camera.target));
+    const [along, across] = tangents(normal);
+    const spacing = 10 ** Math.floor(Math.log10(camera.distance * 0.16));
+    const period = spacing * 10;
+    const shift = [along, across].map((axis) => ((dot(axis, middle) % period) + period) % period);
+    this.quad(this.program, {
+      u_middle: middle, u_along: along, u_across: across, u_size: Math.max(sceneRadius, camera.distance * 0.4) * SIZE_RADII, u_shift: shift, u_spacing: spacing,
+      u_fill: palette.ground, u_line: palette.gridLine, u_contrast: palette.gridContrast, u_normal: normal, u_darkness: palette.shadow,
+    });
   }
 
   /** @param {Program} program @param {import("./context.js").Uniforms} uniforms */

@@ -9,7 +9,7 @@ import { paletteOf, paletteUniforms } from "./theme.js";
 import { SharedUniforms } from "./uniforms.js";
 
 /** @typedef {import("../geometry/math.js").Vec3} Vec3 */
-/** The part of the renderer that the values follow from.
+/** The properties of the renderer that determine the values.
  * @typedef {{
  *   gl: WebGL2RenderingContext, canvas: HTMLCanvasElement, viewport: import("../geometry/camera.js").Viewport,
  *   camera: import("../geometry/camera.js").Camera, simulation: import("../state/simulation.js").Simulation,
@@ -32,7 +32,7 @@ const NOWHERE = scaleThenMove([-9, -9, 0], [0, 0, 0]);
 /** Offset and scale of positions without a frame. */
 const ORIGIN = [0, 0, 0];
 const ONES = [1, 1, 1];
-/** Height of the ground of a scene without one, below everything. */
+/** Offset of the ground plane in a scene without one: below everything. */
 const ABYSS = -1e9;
 
 export class PictureUniforms {
@@ -43,16 +43,16 @@ export class PictureUniforms {
     this.shared = new SharedUniforms(picture.gl);
     /** Those of a pass that differs from the picture. */
     this.pass = new SharedUniforms(picture.gl);
-    /** The plain uniforms of sticks and points that follow from the scene. */
-    this.sizes = {
+    /** The plain uniforms of sticks and points that follow from the scene and the toggles. */
+    this.sceneStyles = {
       sticks: { u_radius: 0, u_radius_min: 0, u_opacity: 1, u_is_all: 1 },
       particles: { u_radius: 0, u_radius_min: 0 },
       marks: { u_radius: 0, u_radius_min: 0 },
     };
     /** The matrix of the picture, in doubles. */
     this.viewProjection = identity();
-    /** The direction towards the light, and the axes that it belongs to. @type {{ axes: import("../geometry/camera.js").Axes | null, direction: Vec3 }} */
-    this.lit = { axes: null, direction: [0, 0, 0] };
+    /** The direction towards the light, with the axes that it was computed for. @type {{ axes: import("../geometry/camera.js").Axes | null, direction: Vec3 }} */
+    this.knownLight = { axes: null, direction: [0, 0, 0] };
     /** The view of the light; null without effects, or without anything near. @type {import("./shadow-map.js").LightView | null} */
     this.lightView = null;
     /** The palette that has been written. @type {import("./theme.js").Palette | null} */
@@ -65,19 +65,19 @@ export class PictureUniforms {
     this.pass.create();
   }
 
-  /** Writes and uploads the values of the present picture. */
+  /** Writes and uploads the values of the current picture. */
   update() {
     this.writeView();
     this.writeScene();
     this.writeColors();
     this.writeLight();
-    this.setSizes();
+    this.setSceneStyles();
     this.shared.upload();
   }
 
   /** Begins a pass that differs from the picture in some shared uniforms. @param {Parameters<SharedUniforms["write"]>[0]} changes */
   beginPass(changes) {
-    this.pass.copy(this.shared);
+    this.pass.copyFrom(this.shared);
     this.pass.write(changes);
     this.pass.upload();
   }
@@ -149,8 +149,8 @@ export class PictureUniforms {
   /** The direction towards the light, which depends only on the axes of the scene. */
   light() {
     const { axes } = this.picture.camera;
-    if (this.lit.axes !== axes) this.lit = { axes, direction: normalize(add(add(scale(axes.up, 0.8), scale(axes.toward, 0.62)), scale(axes.right, -0.5))) };
-    return this.lit.direction;
+    if (this.knownLight.axes !== axes) this.knownLight = { axes, direction: normalize(add(add(scale(axes.up, 0.8), scale(axes.toward, 0.62)), scale(axes.right, -0.5))) };
+    return this.knownLight.direction;
   }
 
   /** The view of the light, onto what is near the picture; null without effects. @param {Vec3} light */
@@ -164,10 +164,11 @@ export class PictureUniforms {
     return near === null ? null : lightView(light, near);
   }
 
-  /** Sets the radii of sticks and points: a fraction of the spacing between particles, but always visible. */
-  setSizes() {
+  /** Sets the radii of sticks and points, a fraction of the spacing between particles but always visible, and which
+   * sticks are drawn how opaque. */
+  setSceneStyles() {
     const { buffers, camera, canvas, simulation, toggles, viewport } = this.picture;
-    const { sticks, particles, marks } = this.sizes;
+    const { sticks, particles, marks } = this.sceneStyles;
     const hasSurface = this.picture.hasSurface();
     const ratio = canvas.height / viewport.height;
     const spacing = buffers?.spacing ?? simulation.radius() * 0.5;

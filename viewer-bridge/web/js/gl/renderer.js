@@ -1,7 +1,7 @@
 // Draws the picture, layer by layer. Uploads only what has changed since the last picture, and draws
 // only if something has.
 
-import { addScaled, dot, multiply, shadowOnto, tangents } from "../geometry/math.js";
+import { dot, multiply, shadowOnto } from "../geometry/math.js";
 import { paletteOf } from "./theme.js";
 import { PAINT } from "./shaders.js";
 import { POINTS, STICKS, stylesOf } from "./styles.js";
@@ -23,8 +23,6 @@ import { polesOf } from "../state/shapes.js";
 
 /** Limit on device pixels per CSS pixel: the cost grows with the square, and a finer picture looks the same. */
 const PIXEL_RATIO_MAX = 2;
-/** Size of the ground, in radii of the scene; it fades out towards its edge. */
-const GROUND_RADII = 6;
 /** Width of the shaft of a force arrow, in CSS pixels. */
 const ARROW_WIDTH = 3;
 /** Depth that solids are drawn behind their place: about 0.15 % of the distance. */
@@ -256,21 +254,10 @@ export class Renderer {
     gl.depthMask(true);
   }
 
-  /** Draws a plane as a patch of ground that fades out, with grid lines at round coordinates.
-   * @param {import("../state/simulation.js").Plane} plane */
+  /** @param {import("../state/simulation.js").Plane} plane */
   drawPlane(plane) {
-    const near = this.camera.target;
-    const palette = paletteOf(this.isDark);
-    const size = Math.max(this.simulation.radius(), this.camera.distance * 0.4) * GROUND_RADII;
-    const middle = addScaled(near, plane.normal, plane.offset - dot(plane.normal, near));
-    const [along, across] = tangents(plane.normal);
-    const spacing = 10 ** Math.floor(Math.log10(this.camera.distance * 0.16));
-    const period = spacing * 10;
-    const shift = [along, across].map((axis) => ((dot(axis, middle) % period) + period) % period);
-    this.ground?.draw({
-      u_middle: middle, u_along: along, u_across: across, u_size: size, u_shift: shift, u_spacing: spacing,
-      u_fill: palette.ground, u_line: palette.gridLine, u_contrast: palette.gridContrast, u_normal: plane.normal, u_darkness: palette.shadow,
-    });
+    const { camera, simulation } = this;
+    this.ground?.drawPlane(plane, camera, simulation.radius(), paletteOf(this.isDark));
   }
 
   /** Draws what casts shadows, as the light sees it. @param {import("./shadow-map.js").LightView} light */
@@ -343,14 +330,14 @@ export class Renderer {
 
   /** @param {import("./context.js").Uniforms} style */
   drawSticks(style) {
-    this.drawables?.sticks.draw(this.uniforms.sizes.sticks, style);
+    this.drawables?.sticks.draw(this.uniforms.sceneStyles.sticks, style);
   }
 
   drawGhost() {
     const { buffers, simulation, uniforms } = this;
     if (simulation.ghost === null || !buffers?.ghost) return;
     uniforms.beginPass(this.styles.ghost);
-    buffers.ghost.draw(uniforms.sizes.sticks, buffers.positions, { isFlat: simulation.scene?.isPlanar ?? false });
+    buffers.ghost.draw(uniforms.sceneStyles.sticks, buffers.positions, { isFlat: simulation.scene?.isPlanar ?? false });
     uniforms.endPass();
   }
 
@@ -359,13 +346,13 @@ export class Renderer {
     const { drawables, toggles } = this;
     if (drawables === null) return;
     const { points } = drawables;
-    const { sizes } = this.uniforms;
-    if (toggles.particles) points.draw(points.particles, sizes.particles, styles.particles);
+    const { sceneStyles } = this.uniforms;
+    if (toggles.particles) points.draw(points.particles, sceneStyles.particles, styles.particles);
     if (!toggles.pins) return;
-    points.draw(points.marks, sizes.marks, styles.marks);
+    points.draw(points.marks, sceneStyles.marks, styles.marks);
     // A grabbed particle stays visible behind a fold.
     this.gl.disable(this.gl.DEPTH_TEST);
-    points.draw(points.grabbed, sizes.marks, styles.marks);
+    points.draw(points.grabbed, sceneStyles.marks, styles.marks);
   }
 
   drawForces() {

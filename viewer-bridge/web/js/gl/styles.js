@@ -1,13 +1,13 @@
-// The plain uniforms of the draws: those in which draws of one pass differ. They are built once, because a new
-// object in each picture would be garbage.
+// The plain uniforms: those outside of the shared block, which differ between the draws of a pass. They are built
+// once, because a new object in each picture would be garbage.
 
 import { PAINT } from "./shaders.js";
 import { paletteOf } from "./theme.js";
 
-/** Colours of the solids. An alpha of `flat` above 0 draws them unlit. Without `edges`, boxes drawn as lines are left out.
+/** Colours of the solids. If the alpha of `flat` is above 0, they are unlit. Boxes drawn as lines have the colour `edges`, and are left out without it.
  * @typedef {{ collider: number[], pole: number[], flat: number[], edges: number[] | null }} ColliderStyle */
 
-/** Depth by which sticks come forward, and their likeness to rods. */
+/** Depth by which sticks come forward, and how much they are shaded like rods. */
 export const STICKS = Object.freeze({
   solid: { u_forward: 4e-4, u_round: 1 },
   flat: { u_forward: 0, u_round: 0.35 },
@@ -17,7 +17,7 @@ export const STICKS = Object.freeze({
   mapped: { u_forward: 0, u_round: 1, u_radius_min: 0.7 },
 });
 
-/** The same of points. Marks lie in front of particles. */
+/** The same for points. Marks lie in front of particles. */
 export const POINTS = Object.freeze({
   solid: { particles: { u_forward: 1.2e-3, u_round: 1 }, marks: { u_forward: 2.4e-3, u_round: 1 } },
   flat: { particles: { u_forward: 0, u_round: 0.6 }, marks: { u_forward: 0, u_round: 0.6 } },
@@ -32,7 +32,7 @@ const fromPalette = ({ backdropTop, backdropBottom, flatSurface, collider, pole,
   cloth: { solid: { u_flat: LIT }, flat: { u_flat: [...flatSurface, 0.85] } },
   colliders: {
     solid: { collider, pole, flat: LIT, edges: [...collider, 1] },
-    flat: { collider, pole, flat: [...collider, 0.55], edges: [...collider, 1] },
+    flat: { collider, pole, flat: [...collider, 0.55], edges: null },
     shadow: { collider, pole, flat: LIT, edges: null },
   },
   /** Changes of the shared uniforms for a ghost, whose positions are not quantised. */

@@ -1,5 +1,6 @@
 // The uniforms that all draws of a pass share, in one block. A picture writes them in place and uploads them
 // once per pass. Setting each of them in every program would make garbage and take most of the time of a draw.
+// Those outside of the block are called plain.
 
 import { HEAT_STOPS, KIND_COLORS } from "./theme.js";
 
@@ -7,7 +8,7 @@ import { HEAT_STOPS, KIND_COLORS } from "./theme.js";
 /** @typedef {keyof typeof MEMBERS} Member */
 /** A number, a vector, a matrix, or a list of vectors. @typedef {number | ArrayLike<number> | number[][]} Value */
 
-/** The members with their GLSL types. A number after a vec3 fills the gap that the next vec3 would leave. */
+/** The members with their GLSL types. A number after a vec3 fills the gap that the next vec3 would otherwise leave. `u_shadow` is 0 but in passes that draw shadows. */
 const MEMBERS = Object.freeze(/** @type {const} */ ({
   u_view_projection: "mat4",
   u_eye: "vec3", u_near: "float",
@@ -106,8 +107,8 @@ export class SharedUniforms {
     else member.set(/** @type {ArrayLike<number>} */ (value));
   }
 
-  /** Takes over the values of another pass. @param {SharedUniforms} other */
-  copy(other) {
+  /** Copies the values of another pass. @param {SharedUniforms} other */
+  copyFrom(other) {
     this.numbers.set(other.numbers);
   }
 
@@ -117,7 +118,7 @@ export class SharedUniforms {
     this.gl.bufferSubData(this.gl.UNIFORM_BUFFER, 0, this.numbers);
   }
 
-  /** Makes the uploaded values those of all draws again. */
+  /** Binds the uploaded values for the next draws. */
   bind() {
     this.gl.bindBufferBase(this.gl.UNIFORM_BUFFER, BLOCK.binding, this.buffer);
   }

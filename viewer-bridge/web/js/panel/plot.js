@@ -99,7 +99,7 @@ export function drawLine(context, series, { from, to, gap }, width, y, color) {
   context.strokeStyle = color;
   context.lineWidth = 1.4;
   context.beginPath();
-  // The middles of pixels as whole numbers, because a fraction would allocate a number for every sample.
+  // The middles of pixels become whole numbers: a fraction would allocate a number for every column.
   context.translate(0.5, 0);
   // No closure changes these: such variables would allocate a number for every sample.
   let column = -1;

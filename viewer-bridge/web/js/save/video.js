@@ -12,7 +12,7 @@ const PART_MS = 500;
 const INTERVAL_MS = 1000 / FRAMES_PER_SECOND - 4;
 const NO_VIDEO = "This browser cannot record video. Save a picture, or make an animation from a recording: recorder export run.mcap --apng run.png";
 
-/** A video that is being made. @typedef {{ recorder: MediaRecorder, context: CanvasRenderingContext2D, type: string, name: string, parts: Blob[], sizeBytes: number, begunMs: number }} Take */
+/** A video that is being made. @typedef {{ recorder: MediaRecorder, context: CanvasRenderingContext2D, type: string, name: string, parts: Blob[], sizeBytes: number, begunMs: number, endedMs: number | null }} Take */
 
 export class Video {
   /** @param {import("../gl/renderer.js").Renderer} renderer @param {import("./composition.js").Composition} composition @param {import("../ui/banner.js").Banner} banner */
@@ -31,8 +31,10 @@ export class Video {
     this.type = canRecord ? chooseType((type) => MediaRecorder.isTypeSupported(type)) : null;
     enable(this.button, this.type === null ? NO_VIDEO : "");
     this.button.addEventListener("click", () => this.toggle());
+    /** Number of videos that have ended and are not saved yet. */
+    this.unsavedCount = 0;
     // The browser asks before it leaves a page whose video is not saved.
-    addEventListener("beforeunload", (event) => { if (this.take !== null) event.preventDefault(); });
+    addEventListener("beforeunload", (event) => { if (this.take !== null || this.unsavedCount > 0) event.preventDefault(); });
   }
 
   toggle() {
@@ -52,7 +54,7 @@ export class Video {
     this.composition.paint(context);
     try {
       const recorder = new MediaRecorder(canvas.captureStream(FRAMES_PER_SECOND), { mimeType: type, videoBitsPerSecond: bitsPerSecond(size) });
-      this.take = { recorder, context, type, name: this.composition.fileName(), parts: [], sizeBytes: 0, begunMs: performance.now() };
+      this.take = { recorder, context, type, name: this.composition.fileName(), parts: [], sizeBytes: 0, begunMs: performance.now(), endedMs: null };
       this.listen(this.take);
       recorder.start(PART_MS);
     } catch (error) {
@@ -82,13 +84,17 @@ export class Video {
     this.take = null;
     this.show(0);
     if (take.sizeBytes === 0) return this.fail("the browser has encoded no picture; keep the page visible");
-    void this.saveVideo(new Blob(take.parts, { type: take.type }), take, (performance.now() - take.begunMs) / 1000);
+    void this.save(take);
   }
 
-  /** @param {Blob} video @param {Take} take @param {number} seconds */
-  async saveVideo(video, { name, type }, seconds) {
+  /** @param {Take} take */
+  async save({ parts, name, type, begunMs, endedMs }) {
+    const seconds = ((endedMs ?? performance.now()) - begunMs) / 1000;
     const ending = endingOf(type);
+    const video = new Blob(parts, { type });
+    this.unsavedCount++;
     save(ending === "webm" ? await withDurationOf(video, seconds) : video, `${name}.${ending}`);
+    this.unsavedCount--;
   }
 
   /** @param {string} reason */
@@ -126,13 +132,19 @@ export class Video {
   }
 }
 
-/** A WebM video with its duration. @param {Blob} video @param {number} seconds */
+/** A WebM video with its duration, or as it is if the browser cannot read it. @param {Blob} video @param {number} seconds */
 async function withDurationOf(video, seconds) {
-  const head = new Uint8Array(await video.slice(0, HEAD_BYTES).arrayBuffer());
-  return new Blob([...withDuration(head, seconds), video.slice(HEAD_BYTES)], { type: video.type });
+  try {
+    const head = new Uint8Array(await video.slice(0, HEAD_BYTES).arrayBuffer());
+    return new Blob([...withDuration(head, seconds), video.slice(HEAD_BYTES)], { type: video.type });
+  } catch {
+    return video;
+  }
 }
 
 /** @param {Take} take */
-function stop({ recorder }) {
-  if (recorder.state !== "inactive") recorder.stop();
+function stop(take) {
+  if (take.recorder.state === "inactive") return;
+  take.endedMs = performance.now();
+  take.recorder.stop();
 }

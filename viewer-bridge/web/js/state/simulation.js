@@ -49,7 +49,7 @@ export class Simulation extends Emitter {
     super();
     /** @type {Scene | null} */
     this.scene = null;
-    /** The bounding sphere of its positions: pictures ask for it many times. */
+    /** The sphere around the bounding box of the scene's positions: each picture asks for it several times. */
     this.extent = { radius: 1, middle: /** @type {Vec3} */ ([0, 0, 0]) };
     /** @type {Topology | null} */
     this.topology = null;
@@ -324,7 +324,7 @@ export class Simulation extends Emitter {
     return this.extent.radius;
   }
 
-  /** The center of the bounding box of the scene's positions. Do not change it. */
+  /** The center of the bounding box of the scene's positions. @returns {Readonly<Vec3>} */
   middle() {
     return this.extent.middle;
   }

@@ -20,14 +20,14 @@ test("a block ends at a multiple of 16 bytes", () => {
   assert.equal(std140({ a: "vec4", b: "float" }).size, 32);
 });
 
-test("values are written at their places, and those of another pass are taken over", () => {
+test("values are written at their places, and those of another pass can be copied", () => {
   const [picture, pass] = [new SharedUniforms(null), new SharedUniforms(null)];
   picture.write({ u_eye: [1, 2, 3], u_near: 4, u_viewport: Float32Array.of(5, 6), u_marks: [[1, 0, 0], [0, 1, 0], [0, 0, 1], [7, 8, 9]] });
   // A matrix of 64 bytes comes first.
   assert.deepEqual([...picture.numbers.subarray(16, 20)], [1, 2, 3, 4]);
   assert.deepEqual([...picture.members.u_viewport], [5, 6]);
   assert.deepEqual([...picture.members.u_marks], [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 7, 8, 9, 0]);
-  pass.copy(picture);
+  pass.copyFrom(picture);
   pass.write({ u_near: 0 });
   assert.deepEqual([pass.members.u_eye[2], pass.members.u_near[0], picture.members.u_near[0]], [3, 0, 4]);
 });

@@ -47,19 +47,19 @@ export class GhostSticks {
   }
 
   /** Draws over the picture. Afterwards, the positions are those of `others` again.
-   * @param {import("../context.js").Uniforms} sizes @param {ArrayTexture} others @param {{ isFlat: boolean }} scene */
-  draw(sizes, others, { isFlat }) {
+   * @param {import("../context.js").Uniforms} sceneStyle @param {ArrayTexture} others @param {{ isFlat: boolean }} scene */
+  draw(sceneStyle, others, { isFlat }) {
     const { gl } = this;
     this.positions.bind();
     if (!isFlat) {
       gl.enable(gl.DEPTH_TEST);
       gl.depthMask(false);
       gl.depthFunc(gl.GREATER);
-      this.sticks.draw(sizes, HIDDEN);
+      this.sticks.draw(sceneStyle, HIDDEN);
       gl.depthMask(true);
       gl.depthFunc(gl.LEQUAL);
     }
-    this.sticks.draw(sizes, isFlat ? FLAT : VISIBLE);
+    this.sticks.draw(sceneStyle, isFlat ? FLAT : VISIBLE);
     others.bind();
   }
 

@@ -75,12 +75,12 @@ export class Points {
     this.grabbed = new PointList(gl);
   }
 
-  /** @param {PointList} list @param {import("../context.js").Uniforms} sizes @param {import("../context.js").Uniforms} style */
-  draw(list, sizes, style) {
+  /** @param {PointList} list @param {import("../context.js").Uniforms} sceneStyle @param {import("../context.js").Uniforms} style */
+  draw(list, sceneStyle, style) {
     if (list.count === 0) return;
     const { gl } = this;
     this.program.use();
-    this.program.set(sizes, style);
+    this.program.set(sceneStyle, style);
     gl.bindVertexArray(list.vao);
     gl.drawArrays(gl.POINTS, 0, list.count);
     gl.bindVertexArray(null);

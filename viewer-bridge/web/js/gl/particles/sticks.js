@@ -192,12 +192,12 @@ export class Sticks {
     gl.bufferSubData(gl.ARRAY_BUFFER, 0, this.words);
   }
 
-  /** @param {import("../context.js").Uniforms} sizes @param {import("../context.js").Uniforms} style values that come before those */
-  draw(sizes, style) {
+  /** @param {import("../context.js").Uniforms} sceneStyle @param {import("../context.js").Uniforms} style takes precedence */
+  draw(sceneStyle, style) {
     if (this.drawn.length === 0) return;
     const { gl } = this;
     this.program.use();
-    this.program.set(sizes, style);
+    this.program.set(sceneStyle, style);
     gl.bindVertexArray(this.vao);
     gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, this.drawn.length);
     gl.bindVertexArray(null);
