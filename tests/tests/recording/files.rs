@@ -45,7 +45,7 @@ fn rows(file: &str) -> Vec<StepRow> {
     .collect()
 }
 
-fn steps(file: &str) -> Vec<u64> {
+pub(crate) fn steps(file: &str) -> Vec<u64> {
     rows(file).into_iter().map(|row| row.step).collect()
 }
 

@@ -135,11 +135,15 @@ impl Feed {
     /// Accepts messages that arrived between states, and passes everything to the queue. Returns the end
     /// of the recording, if it is reached.
     pub(crate) fn accept_messages(&mut self, messages: Messages) -> Option<RunEnd> {
+        let was_paused = self.is_paused;
         if let Some(status) = messages.statuses.last() {
             self.is_paused = status.flags & StatusFlags::PAUSED != 0;
         }
         self.intake.accept_messages(messages, Now::read(), &mut self.accepted);
         self.enqueue();
+        if self.is_paused && !was_paused {
+            self.push_last_snapshot();
+        }
         self.end_part_early();
         self.accepted.end.take()
     }
@@ -180,9 +184,6 @@ impl Feed {
         if !self.intake.has_started() {
             return;
         }
-        if let Some(content) = self.selector.take_last_snapshot() {
-            self.queue.push(Item { content, log_time_ns: realtime_ns() });
-        }
         let (is_full, last_step) = (self.is_full(1), self.intake.last_step());
         let (stop_reason, end) = match &mut self.trigger {
             Some(trigger) => {
@@ -193,6 +194,9 @@ impl Feed {
             }
             None => (stop_reason, FileEnd::Write),
         };
+        if end == FileEnd::Write {
+            self.push_last_snapshot();
+        }
         let mut closing = self.intake.end_file(stop_reason);
         closing.counts.set_left_out(&self.selector.take_counts());
         self.queue.end(closing, end);
@@ -235,8 +239,16 @@ impl Feed {
             if let Some(trigger) = &mut self.trigger {
                 trigger.watch(&content, now_ns);
             }
-            let Some(content) = self.selector.select(content) else { continue };
-            self.queue.push(Item { content, log_time_ns });
+            if let Some(item) = self.selector.select(Item { content, log_time_ns }) {
+                self.queue.push(item);
+            }
+        }
+    }
+
+    /// Records the last snapshot, if it was left out.
+    fn push_last_snapshot(&mut self) {
+        if let Some(item) = self.selector.take_last_snapshot(realtime_ns()) {
+            self.queue.push(item);
         }
     }
 

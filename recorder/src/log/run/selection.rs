@@ -60,8 +60,8 @@ impl ContentSelection {
         Topic::Particles,
     ];
 
-    /// Leaves out topics of [`ContentSelection::OPTIONAL`], and all snapshots without a keyframe but every n-th
-    /// and the last one.
+    /// Leaves out topics of [`ContentSelection::OPTIONAL`]. Of the snapshots, keeps every n-th, those with a keyframe,
+    /// and the last one of each file and before each pause.
     ///
     /// # Panics
     /// If another topic is left out.
@@ -121,8 +121,8 @@ impl ContentSelection {
         !self.left_out[topic.index()]
     }
 
-    /// Returns `true` for the number of a snapshot that is recorded, whether it has a keyframe or not, and whether
-    /// it is the last one or not.
+    /// Returns `true` if a snapshot with this number is always recorded. Others are recorded with a keyframe, and as
+    /// the last one of a file or before a pause.
     pub fn has_snapshot(&self, index: u32) -> bool {
         index.is_multiple_of(self.every.get())
     }

@@ -42,7 +42,8 @@ fn every_seventh_snapshot_verifies_and_nothing_counts_as_lost() {
         assert!(recorded.contains(&step), "step {step} is not in {recorded:?}");
     }
     assert_eq!(recorded.last(), Some(&200), "the file ends where the recording did");
-    // The others have a keyframe: the first step, and the first one after each round of commands.
+    // The others have a keyframe: the first step, and the first one after each round of commands. Except for the
+    // last one.
     let others: Vec<_> = recorded.iter().filter(|step| *step % 7 != 0).collect();
     assert!(recorded.len() < 60 && others.len() >= 8, "{recorded:?}");
     let verified = recorder(&sandbox, &["verify", "--json", &file]).json();
@@ -50,6 +51,37 @@ fn every_seventh_snapshot_verifies_and_nothing_counts_as_lost() {
     assert_eq!(verified["lost"], json!({}), "{verified}");
     let info = recorder(&sandbox, &["info", "--json", &file]).json();
     assert_eq!(info["lost"], json!({}), "{info}");
+}
+
+#[test]
+fn the_last_snapshot_before_a_pause_is_recorded_although_a_command_follows() {
+    let sandbox = Sandbox::new();
+    let file = sandbox.path("run.mcap");
+    let _node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
+    let mut recording = record(&sandbox, &["-o", &file, "--every", "1000000"]);
+    recording.wait_for_line("recording from step");
+    let mut client = Client::attach(&sandbox.endpoint()).unwrap();
+    client.request(Action::Pause, DEADLINE).unwrap();
+    let last_step = client.latest_snapshot(DEADLINE).unwrap().unwrap().header().step;
+    // It belongs to the next step, which is never made.
+    client.request(Action::Pin { particle: 100 }, DEADLINE).unwrap();
+    recording.interrupt().success();
+    assert_eq!(steps(&file).last(), Some(&last_step));
+}
+
+#[test]
+fn the_last_snapshot_before_a_load_is_recorded() {
+    let sandbox = Sandbox::new();
+    let _node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain", "--paused"]);
+    let args = ["-o", &sandbox.path("run.mcap"), "--every", "1000000", "--follow"];
+    let recording = record(&sandbox, &args);
+    ctl(&sandbox, &["step", "20"]);
+    // With another rate, its outcome belongs to step 21.
+    ctl(&sandbox, &["load", "ragdoll"]);
+    let first = sandbox.path("run_0000.mcap");
+    wait_for("the end of the first file", || Path::new(&first).exists().then_some(()));
+    recording.interrupt().success();
+    assert_eq!(steps(&first).last(), Some(&20));
 }
 
 #[test]

@@ -8,6 +8,8 @@ use integration_tests::{DEADLINE, Process, Program, Sandbox, ctl, wait_for};
 use recorder::{FrameReader, LogReader, Message};
 use sim_contract::{Action, Change, Client, ColliderState, ParameterValues, Tap};
 
+use crate::files::steps;
+
 /// A cloth that falls onto a ball. A node publishes a keyframe each second: every 60 steps.
 const SCENE: &str = r#"
 version = 1
@@ -87,8 +89,7 @@ fn split(sandbox: &Sandbox, node_args: &[&str], recorder_args: &[&str]) -> Vec<S
     (0..file_count()).map(path).collect()
 }
 
-/// Reads what a reader knows with each snapshot, and the number of outcomes after the last snapshot of
-/// each file.
+/// Reads what a reader knows with each snapshot, and the number of outcomes after the last snapshots of files.
 fn read(files: &[String]) -> (Vec<Known>, usize) {
     let (mut known, mut all, mut trailing_count) = (Known::default(), Vec::new(), 0);
     // A message can precede an earlier snapshot in the file.
@@ -149,10 +150,15 @@ fn changes_between_the_last_snapshot_of_a_file_and_the_first_of_the_next_are_pla
         let sandbox = Sandbox::new();
         let files = split(&sandbox, node_args, recorder_args);
         let (recorded, trailing_count) = read(&files);
+        assert!(recorded.last().unwrap().outcomes.len() > 20, "there are commands");
         if recorder_args.is_empty() {
             assert!(trailing_count > 20, "{trailing_count}: there are outcomes between the files");
+        } else {
+            for pair in files.windows(2) {
+                let [last, first] = [steps(&pair[0]).pop(), steps(&pair[1]).first().copied()];
+                assert_eq!(last.map(|step| step + 1), first, "a file ends with its last snapshot");
+            }
         }
-        assert!(recorded.last().unwrap().outcomes.len() > 20, "there are commands");
         let shown = played(&sandbox, &files);
         assert_eq!(shown.len(), recorded.len(), "each snapshot");
         for (shown, recorded) in shown.iter().zip(&recorded) {

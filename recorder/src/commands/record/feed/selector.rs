@@ -3,9 +3,10 @@
 use std::num::NonZeroU32;
 
 use recorder::{AllCounts, ContentSelection, Message, ParticleBuffer, StepRow, Topic};
+use sim_contract::clock::SECOND_NS;
 
 use crate::cli::parse::whole_number_in;
-use crate::commands::record::queue::Content;
+use crate::commands::record::queue::{Content, Item};
 
 /// Options that leave out a part of a run.
 #[derive(Debug, Clone, clap::Args)]
@@ -19,8 +20,8 @@ pub(crate) struct SelectionArgs {
     /// topic name it
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = optional_topic)]
     exclude: Vec<Topic>,
-    /// Record every N-th snapshot, those with a keyframe, and the last one. Commands and tears between
-    /// them are recorded, so the file can still be verified
+    /// Record every N-th snapshot, those with a keyframe, and the last one of each file and before each
+    /// pause. Commands and tears between them are recorded, so the file can still be verified
     #[arg(long, value_name = "N", default_value = "1", allow_hyphen_values = true,
         value_parser = period)]
     every: NonZeroU32,
@@ -92,6 +93,20 @@ fn period(text: &str) -> Result<NonZeroU32, String> {
 /// In a recording of commands, one keyframe of this number has particles: about one each ten seconds.
 const KEYFRAMES_PER_STATE: u32 = 10;
 
+/// Longest time for which messages of a later step may precede the last snapshot of a file. Readers look for them at
+/// most one chunk earlier, and a chunk is written after about a second at the latest.
+const OVERTAKEN_MAX_NS: u64 = SECOND_NS;
+
+/// A snapshot that was left out.
+#[derive(Debug)]
+struct LeftOut {
+    row: StepRow,
+    particles: ParticleBuffer,
+    log_time_ns: u64,
+    /// Time of the first selected message of a later step.
+    overtaken_ns: Option<u64>,
+}
+
 /// Leaves out what is not selected, and counts it.
 #[derive(Debug)]
 pub(super) struct Selector {
@@ -103,8 +118,8 @@ pub(super) struct Selector {
     keyframes_since_state: Option<u32>,
     /// Step of the newest state that a command put in place. Its particles follow from nothing else.
     in_place_step: Option<u64>,
-    /// The newest snapshot, if it was left out and no message of a later step was selected after it.
-    last_left_out: Option<(StepRow, ParticleBuffer)>,
+    /// The newest snapshot, if it was left out.
+    last_left_out: Option<LeftOut>,
     /// Only `left_out` is set.
     counts: AllCounts,
 }
@@ -121,8 +136,14 @@ impl Selector {
         }
     }
 
-    /// Returns the part of a content that is recorded.
-    pub(super) fn select(&mut self, content: Content) -> Option<Content> {
+    /// Returns the part of an item that is recorded.
+    pub(super) fn select(&mut self, item: Item) -> Option<Item> {
+        let Item { content, log_time_ns } = item;
+        let content = self.selected_part(content, log_time_ns)?;
+        Some(Item { content, log_time_ns })
+    }
+
+    fn selected_part(&mut self, content: Content, log_time_ns: u64) -> Option<Content> {
         match content {
             Content::Update(message) => {
                 match &message {
@@ -132,18 +153,23 @@ impl Selector {
                     }
                     _ => {}
                 }
-                let is_selected = self.has(message.topic());
-                if is_selected {
-                    self.last_left_out.take_if(|(row, _)| row.step < message.step());
+                if !self.has(message.topic()) {
+                    return None;
                 }
-                is_selected.then_some(Content::Update(message))
+                let last = self.last_left_out.as_mut();
+                if let Some(last) = last.filter(|last| last.row.step < message.step()) {
+                    last.overtaken_ns.get_or_insert(log_time_ns);
+                }
+                Some(Content::Update(message))
             }
             Content::Snapshot(row, particles) => {
                 let is_due = row.snapshot_index.is_none_or(|one| self.selection.has_snapshot(one));
                 let has_keyframe = self.keyframe_step == Some(row.step);
                 if !is_due && !has_keyframe {
                     self.count_snapshots(|left_out| left_out + 1);
-                    self.last_left_out = Some((row, particles));
+                    let overtaken_ns = None;
+                    self.last_left_out =
+                        Some(LeftOut { row, particles, log_time_ns, overtaken_ns });
                     return None;
                 }
                 self.last_left_out = None;
@@ -154,10 +180,13 @@ impl Selector {
 
     /// Returns what is recorded of the newest snapshot at the end of a file, if it was left out: a file ends
     /// where the recording did, not up to a period before.
-    pub(super) fn take_last_snapshot(&mut self) -> Option<Content> {
-        let (row, particles) = self.last_left_out.take()?;
+    pub(super) fn take_last_snapshot(&mut self, now_ns: u64) -> Option<Item> {
+        let LeftOut { row, particles, log_time_ns, overtaken_ns } = self.last_left_out.take()?;
+        if overtaken_ns.is_some_and(|since_ns| now_ns.saturating_sub(since_ns) > OVERTAKEN_MAX_NS) {
+            return None;
+        }
         self.count_snapshots(|left_out| left_out - 1);
-        Some(self.recorded_part(row, particles))
+        Some(Item { content: self.recorded_part(row, particles), log_time_ns })
     }
 
     fn count_snapshots(&mut self, count: impl Fn(u64) -> u64) {
@@ -222,17 +251,33 @@ mod tests {
         Content::Update(Message::Keyframe { step, bytes: Vec::new() })
     }
 
+    /// Selects a content that arrives when its step ends.
+    fn select(selector: &mut Selector, content: Content) -> Option<Content> {
+        let log_time_ns = match &content {
+            Content::Snapshot(row, _) => row.step,
+            Content::Update(message) => message.step(),
+        };
+        selector.select(Item { content, log_time_ns }).map(|item| item.content)
+    }
+
+    /// Step of a snapshot, which was received when the step ended.
+    fn step_of(item: Option<Item>) -> Option<u64> {
+        let Item { content, log_time_ns } = item?;
+        let step = content.snapshot_step().unwrap();
+        assert_eq!(log_time_ns, step);
+        Some(step)
+    }
+
     #[test]
     fn snapshots_of_the_period_and_those_with_a_keyframe_are_selected() {
         let every = NonZeroU32::new(4).unwrap();
         let mut selector = Selector::new(ContentSelection::new(every, &[Topic::Keyframe]));
-        assert_eq!(selector.select(keyframe(3)), None);
+        assert_eq!(select(&mut selector, keyframe(3)), None);
         let selected: Vec<_> =
-            (0..10).filter(|one| selector.select(snapshot(*one)).is_some()).collect();
+            (0..10).filter(|one| select(&mut selector, snapshot(*one)).is_some()).collect();
         assert_eq!(selected, [0, 3, 4, 8]);
-        let last = selector.take_last_snapshot();
-        assert!(matches!(last, Some(Content::Snapshot(StepRow { step: 9, .. }, _))));
-        assert_eq!(selector.take_last_snapshot(), None);
+        assert_eq!(step_of(selector.take_last_snapshot(9)), Some(9));
+        assert_eq!(selector.take_last_snapshot(9), None);
         let counts = selector.take_counts();
         assert_eq!((counts[Topic::Particles].left_out, counts[Topic::Steps].left_out), (5, 5));
         assert_eq!(counts[Topic::Keyframe].left_out, 1);
@@ -240,25 +285,28 @@ mod tests {
     }
 
     #[test]
-    fn a_file_ends_with_its_last_snapshot_unless_messages_of_a_later_step_came_after_it() {
+    fn a_file_ends_with_its_last_snapshot_unless_a_later_step_began_long_before() {
         let mut selector = Selector::new(ContentSelection::new(NonZeroU32::new(4).unwrap(), &[]));
-        let last_step = |selector: &mut Selector| match selector.take_last_snapshot() {
-            Some(Content::Snapshot(row, _)) => Some(row.step),
-            _ => None,
-        };
+        let last_step =
+            |selector: &mut Selector, now_ns| step_of(selector.take_last_snapshot(now_ns));
         for index in 0..=8 {
-            selector.select(snapshot(index));
+            select(&mut selector, snapshot(index));
         }
-        assert_eq!(last_step(&mut selector), None, "the last one was selected");
-        selector.select(snapshot(9));
-        selector.select(keyframe(9));
-        assert_eq!(last_step(&mut selector), Some(9));
-        selector.select(snapshot(10));
-        selector.select(keyframe(11));
-        assert_eq!(last_step(&mut selector), None, "step 11 has begun in the file");
-        selector.select(snapshot(13));
+        assert_eq!(last_step(&mut selector, 8), None, "the last one was selected");
+        for (time_ns, expected) in [(OVERTAKEN_MAX_NS, Some(9)), (OVERTAKEN_MAX_NS + 1, None)] {
+            select(&mut selector, snapshot(9));
+            select(&mut selector, keyframe(9));
+            // Step 10 has begun in the file.
+            select(&mut selector, keyframe(10));
+            select(&mut selector, keyframe(11));
+            assert_eq!(last_step(&mut selector, 10 + time_ns), expected);
+        }
+        select(&mut selector, snapshot(13));
+        assert_eq!(last_step(&mut selector, u64::MAX), Some(13), "nothing has overtaken it");
+        assert_eq!(last_step(&mut selector, SECOND_NS), None, "it is taken once");
+        select(&mut selector, snapshot(14));
         selector.take_counts();
-        assert_eq!(last_step(&mut selector), None, "it belongs to the file before");
+        assert_eq!(last_step(&mut selector, SECOND_NS), None, "it belongs to the file before");
     }
 
     #[test]
@@ -267,8 +315,8 @@ mod tests {
         let mut selector = Selector::new(selection);
         let states = |selector: &mut Selector, steps: std::ops::Range<u32>| {
             let is_state = |step: &u32| {
-                selector.select(keyframe(u64::from(*step)));
-                matches!(selector.select(snapshot(*step)), Some(Content::Snapshot(..)))
+                select(selector, keyframe(u64::from(*step)));
+                matches!(select(selector, snapshot(*step)), Some(Content::Snapshot(..)))
             };
             steps.filter(is_state).collect::<Vec<_>>()
         };
@@ -278,7 +326,7 @@ mod tests {
             [(25, Ok(()), vec![25]), (27, Err(Reason::UnknownStep), vec![])]
         {
             let outcome = Outcome::new(0, step.into(), Command::new(1, 1, rewind), result);
-            selector.select(Content::Update(Message::Outcome(OutcomeRow::from(&outcome))));
+            select(&mut selector, Content::Update(Message::Outcome(OutcomeRow::from(&outcome))));
             assert_eq!(states(&mut selector, step..step + 2), expected);
         }
         assert_eq!(selector.take_counts()[Topic::Particles].left_out, 29 - 4);
@@ -289,7 +337,7 @@ mod tests {
     fn without_particles_the_header_of_a_snapshot_stays() {
         let mut selector =
             Selector::new(ContentSelection::new(NonZeroU32::MIN, &[Topic::Particles]));
-        let selected = selector.select(snapshot(5)).unwrap();
+        let selected = select(&mut selector, snapshot(5)).unwrap();
         assert!(matches!(selected, Content::Update(Message::Step(StepRow { step: 5, .. }))));
     }
 
