@@ -83,8 +83,12 @@ mod tests {
     use super::*;
     use crate::owner::Owner;
     use crate::owner::load::Load;
+    use crate::ports::reader::subscribe;
+    use crate::ports::service::{COMMANDS, READY, RESTORE};
+    use crate::ports::services::Services;
     use crate::ports::session::Access;
     use crate::testing::TestDomain;
+    use crate::{AttachError, Client};
 
     fn create_owner(endpoint: &Endpoint) -> Result<Owner, OwnerError> {
         let load = Load::default();
@@ -108,6 +112,26 @@ mod tests {
         }
         let error = create_owner(&domain.endpoint()).unwrap_err();
         assert!(matches!(error, OwnerError::NameTaken { .. }), "{error}");
+    }
+
+    #[test]
+    fn a_client_attaches_only_to_an_owner_that_receives_commands() {
+        let domain = TestDomain::new();
+        let endpoint = domain.endpoint();
+        let session = Session::join(&endpoint).unwrap();
+        let status = session.values(&STATUS, Access::Create).unwrap();
+        let _status = claim_name(&session, &status).unwrap();
+        // As within `Owner::create`, between the services and the ports.
+        let services = Services::access(&session, Access::Create).unwrap();
+        let error = Client::attach(&endpoint).unwrap_err();
+        assert!(matches!(error, AttachError::NoNode { .. }), "{error}");
+        let _ready = subscribe(&services.ready, &READY).unwrap();
+        let _restore = subscribe(&services.restore, &RESTORE).unwrap();
+        std::thread::scope(|scope| {
+            let client = scope.spawn(|| Client::attach(&endpoint).map(drop));
+            let _commands = subscribe(&services.commands, &COMMANDS).unwrap();
+            client.join().unwrap().unwrap();
+        });
     }
 
     #[test]

@@ -97,6 +97,13 @@ impl Services {
         .concat()
     }
 
+    /// Returns `true` once the owner receives what clients send. It creates its ports after the services.
+    fn are_received(&self) -> bool {
+        [reader_count(&self.commands), reader_count(&self.ready), reader_count(&self.restore)]
+            .iter()
+            .all(|count| *count > 0)
+    }
+
     /// Returns the number of readers of everything that the owner publishes, except the status.
     pub(crate) fn reader_count(&self) -> usize {
         reader_count(&self.particles)
@@ -193,7 +200,7 @@ pub(crate) struct Attachment {
     pub(crate) session: Session,
 }
 
-/// Most attempts to open the services of an owner that is still creating them.
+/// Most attempts to open the services of an owner that is still creating them and its ports.
 const ATTEMPTS_MAX: usize = 100;
 
 impl Attachment {
@@ -208,7 +215,7 @@ impl Attachment {
         }
     }
 
-    /// Opens all services of a living owner.
+    /// Opens all services of a living owner, once it receives commands.
     pub(crate) fn open(session: Session) -> Result<Self, AttachError> {
         let status = match session.values(&STATUS, Access::Open) {
             Err(ServiceError::Missing { service, .. }) => {
@@ -226,7 +233,11 @@ impl Attachment {
                 Err(ServiceError::Missing { .. }) => session.pause(),
                 services if is_mirror => return Self::open_mirror(session, status, services?),
                 services => {
-                    return Ok(Self { services: services?, status, mirror: None, session });
+                    let services = services?;
+                    if services.are_received() {
+                        return Ok(Self { services, status, mirror: None, session });
+                    }
+                    session.pause();
                 }
             }
         }

@@ -41,7 +41,8 @@ impl Bounds {
         }
     }
 
-    /// A box that holds the points of this one after `time` displacements, `time` >= 0, which lie within another box.
+    /// A box that holds every point of this one after `time` displacements, `time` >= 0. `displacements` holds every
+    /// displacement.
     #[inline(always)]
     pub(super) fn moved(&self, displacements: &Self, time: f32) -> Self {
         if time == 0.0 {

@@ -13,6 +13,7 @@ pub(crate) mod order;
 mod pair;
 mod push;
 mod surfaces;
+mod tile;
 mod tile_tree;
 
 use box_tree::{Search, pair_order};
@@ -21,7 +22,8 @@ use load::{LaneMasks, LoadPairs};
 use order::{order_by_key, order_key};
 use pair::Pair;
 use surfaces::{SurfaceContacts, SurfaceSearch};
-use tile_tree::{Query, TILE, TILE_LENGTH, TileTree, take_lowest};
+use tile::{TILE, TILE_LENGTH, take_lowest};
+use tile_tree::{Query, TileTree};
 
 use crate::kernels::Kernels;
 use crate::kernels::lanes::PackedParticle;
@@ -35,10 +37,13 @@ use crate::store::{Location, ParticleStore, Paths, Progress};
 /// another contact may push them together.
 const REACH: f32 = 1.1;
 /// Distance by which two particles may come nearer than on their paths, in contact distances: each may leave its own by
-/// half of it. A larger one finds more candidates, a smaller one finds them more often. No bit depends on it.
+/// half of it. A larger one finds more candidates, a smaller one finds them more often. No bit depends on it unless there
+/// are too many candidates.
 const PARTICLES_MARGIN: f32 = 0.25;
 /// The same where cloths touch as surfaces. There, candidates are found at the start of the paths, so bits depend on it.
 const SURFACES_MARGIN: f32 = 0.2;
+/// Part of the tiles with strays from which on all paths begin anew: a full search is then as fast.
+const STRAY_PART_MAX: f32 = 0.5;
 /// Largest number of candidates for each particle, on average. It bounds the time of a step in which
 /// particles pile up in one point.
 const CANDIDATES_PER_PARTICLE: usize = 8;
@@ -64,12 +69,14 @@ pub(crate) struct ParticleContacts {
     tree: TileTree,
     /// The paths for which the candidates were found.
     paths: Paths,
-    /// Substep for which the candidates were found. None before the first one of a step.
-    found_at: Option<Substep>,
+    /// Substep in which the paths begin. None before the first one of a step.
+    paths_begin_at: Option<Substep>,
+    /// True if the newest search has found all candidates.
+    is_complete: bool,
     pair_count_max: usize,
     /// In the order of the search.
     candidates: Vec<Pair>,
-    /// The candidates in the order of contact.
+    /// The candidates in the order of contact. A merge uses it for those in the order of the search.
     ordered: Vec<Pair>,
     /// By tile: a bit for each particle that is part of a candidate.
     involved: Vec<u32>,
@@ -117,7 +124,8 @@ impl ParticleContacts {
             surfaces: surfaces.unwrap_or_default(),
             tree: TileTree::new(count),
             particles,
-            found_at: None,
+            paths_begin_at: None,
+            is_complete: false,
             candidates: Vec::with_capacity(pair_count_max),
             ordered: Vec::with_capacity(pair_count_max),
             involved: vec![0; count.div_ceil(TILE)],
@@ -149,7 +157,7 @@ impl ParticleContacts {
 
     /// Forgets the candidates of the step before, and takes torn triangles out.
     pub(crate) fn begin_step(&mut self, torn: &Torn) {
-        self.found_at = None;
+        self.paths_begin_at = None;
         self.surfaces.begin_step(torn);
     }
 
@@ -203,9 +211,9 @@ impl ParticleContacts {
     /// Finds the tiles with particles that are not where the candidates expect them at the end of the substep.
     fn find_strays(&mut self, store: &ParticleStore, substep: Substep) {
         let has_stray = &mut self.tree.has_stray;
-        let Some(found_at) = self.found_at else { return has_stray.fill(true) };
+        let Some(begin) = self.paths_begin_at else { return has_stray.fill(true) };
         has_stray.fill(false);
-        let count = (substep.index - found_at.index + 1) as f32;
+        let count = (substep.index - begin.index + 1) as f32;
         // Less than half of the margin for each particle, so that rounding loses no pair.
         let limit = 0.24 * self.margin * self.margin;
         store.mark_strays(&self.paths, Progress { count, limit }, has_stray);
@@ -214,19 +222,17 @@ impl ParticleContacts {
     /// Finds the candidates in tiles with strays for the rest of the step, and orders all.
     fn find_candidates(&mut self, store: &ParticleStore, substep: Substep) {
         let stray_count = self.tree.has_stray.iter().filter(|has_stray| **has_stray).count();
-        // Candidates of surfaces walk over the triangles from where all paths began.
-        let passed = match self.found_at {
-            Some(found_at)
-                if 2 * stray_count < self.tree.tiles.len() && !self.surfaces.are_on() =>
-            {
-                let passed = (substep.index - found_at.index) as f32;
-                self.follow_strays(store, passed);
-                passed
-            }
-            _ => {
-                self.begin_paths(store, substep);
-                0.0
-            }
+        let are_few = (stray_count as f32) < STRAY_PART_MAX * self.tree.tiles.len() as f32;
+        // Candidates of surfaces walk over the triangles from the beginning of all paths at once. An incomplete search
+        // has left out candidates of tiles without strays.
+        let is_partial = are_few && self.is_complete && !self.surfaces.are_on();
+        let passed = if let Some(begin) = self.paths_begin_at.filter(|_| is_partial) {
+            let passed = (substep.index - begin.index) as f32;
+            self.follow_strays(store, passed);
+            passed
+        } else {
+            self.begin_paths(store, substep);
+            0.0
         };
         let kernels = store.kernels();
         let span = substep.left() as f32;
@@ -239,13 +245,14 @@ impl ParticleContacts {
             let search = SurfaceSearch { tree, states, particles, span, distance, kernels };
             is_complete &= self.surfaces.find(&search).is_continue();
         }
+        self.is_complete = is_complete;
         self.overflow_count += u64::from(!is_complete);
         self.order_candidates();
     }
 
     /// Gives all particles new paths, from this substep on.
     fn begin_paths(&mut self, store: &ParticleStore, substep: Substep) {
-        self.found_at = Some(substep);
+        self.paths_begin_at = Some(substep);
         store.save_paths(&mut self.paths);
         self.load_all(store);
         self.tree.has_stray.fill(true);

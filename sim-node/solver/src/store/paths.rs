@@ -2,7 +2,7 @@
 
 use crate::kernels::lanes::{LaneWork, PackedParticle, Wide, axes};
 
-/// Position and displacement of every particle at one time.
+/// Where the path of every particle begins, its displacement in a substep, and its tile.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Paths {
     /// By patch.
@@ -13,7 +13,7 @@ pub(crate) struct Paths {
     pub(super) tiles_of_graph: Vec<u32>,
 }
 
-/// The tile of a particle that no one follows.
+/// The tile of a particle without contacts. It is beyond all tiles, so its path is compared but not noted.
 pub(super) const NO_TILE: u32 = u32::MAX;
 
 /// The elapsed part of the paths, and how far a particle may be beside its own.
@@ -40,7 +40,7 @@ impl Progress {
     }
 }
 
-/// Marks the tiles of particles in lanes with a bit.
+/// Marks the tile of each lane whose bit is set.
 #[inline(always)]
 pub(super) fn mark_tiles(mut lanes: u32, tiles: &[u32; 8], has_stray: &mut [bool]) {
     while lanes != 0 {

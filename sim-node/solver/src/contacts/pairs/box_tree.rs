@@ -6,7 +6,7 @@ use crate::kernels::lanes::{LaneWork, Lanes8, Wide};
 
 /// Number of children of a node.
 const ARITY: usize = 4;
-/// Largest number of levels: a tree has at most 2^24 leaves, and the root.
+/// Largest number of levels: twelve of nodes above 2^24 = 4^12 leaves.
 const LEVELS_MAX: usize = 13;
 
 /// Order to go on, or to give a search up.
@@ -18,7 +18,7 @@ pub(super) struct BoxTree {
     levels: Vec<Vec<Bounds>>,
     /// The same boxes, to compare all sides of two boxes at once.
     sides: Vec<Vec<Sides>>,
-    /// By node: a leaf below it is marked. A search leaves pairs without a marked leaf out. All are marked at first.
+    /// By node: a leaf below it is marked. A search skips pairs without a marked leaf. All are marked at first.
     is_marked: Vec<Vec<bool>>,
 }
 
@@ -31,15 +31,15 @@ impl Sides {
         Self([max[0], max[1], max[2], 0.0, -min[0], -min[1], -min[2], 0.0])
     }
 
-    /// True if a box is at most `distance` apart from another one on every axis, for which `facing` has
-    /// [`facing_sides`].
+    /// True if a box is at most a distance apart from another one on every axis, for which `facing` has
+    /// [`facing_sides`]. `moved_out` has the distance where sides are smallest coordinates, and 0 elsewhere.
     #[inline(always)]
-    fn are_near<W: Wide>(&self, facing: W, distance: W) -> bool {
-        W::bits(facing.is_at_most(W::load(&self.0, 0) + distance)) == 0xff
+    fn are_near<W: Wide>(&self, facing: W, moved_out: W) -> bool {
+        W::bits(facing.is_at_most(W::load(&self.0, 0) + moved_out)) == 0xff
     }
 }
 
-/// The numbers of a box that those of [`Sides`] are compared with.
+/// The sides of a box that face those of another one ([`Sides`]); the smallest coordinates are moved out by `distance`.
 #[inline(always)]
 fn facing_sides(Bounds { min, max }: &Bounds, distance: f32) -> Lanes8 {
     let [x, y, z] = min.map(|min| min - distance);
@@ -92,7 +92,7 @@ impl BoxTree {
         }
     }
 
-    /// Passes every pair of leaves of this tree that are near each other, and one of which is marked, to `accept`,
+    /// Passes every pair of leaves of this tree that are near each other, at least one of them marked, to `accept`,
     /// each once and with itself, the earlier leaf first. The order of two pairs is that of [`pair_order`].
     pub(super) fn search(
         &self,
@@ -202,19 +202,19 @@ impl<F: FnMut([u32; 2]) -> Search> LaneWork for PairSearch<'_, F> {
 }
 
 impl Stack {
-    /// Pushes the pairs of children of two nodes that are near each other. (A closure in the loop would be compiled for
-    /// the baseline processor.)
+    /// Pushes the pairs of children of two nodes that are near each other. The comparison stands in the body of the loop:
+    /// in a closure of `filter`, it would be compiled for the baseline processor.
     #[inline(always)]
     fn push_children<W: Wide>(&mut self, tree: &BoxTree, [a, b]: [Node; 2], distance: f32) {
-        let (d, no) = (distance, 0.0);
-        let far_side = W::load(&[no, no, no, no, d, d, d, no], 0);
+        let d = distance;
+        let moved_out = W::load(&[0.0, 0.0, 0.0, 0.0, d, d, d, 0.0], 0);
         let rights = tree.children(b);
         for left in tree.children(a).rev() {
             let facing = W::load(&facing_sides(tree.bounds(left), distance), 0);
             let is_marked = tree.is_marked(left);
             for right in rights.clone().rev().take_while(|right| left.index <= right.index) {
                 let sides = &tree.sides[right.level][right.index];
-                if (is_marked | tree.is_marked(right)) && sides.are_near(facing, far_side) {
+                if (is_marked | tree.is_marked(right)) && sides.are_near(facing, moved_out) {
                     self.pairs[self.length] = [left, right];
                     self.length += 1;
                 }
@@ -251,5 +251,54 @@ impl Node {
     #[inline(always)]
     fn leaf(self) -> u32 {
         self.index as u32
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Boxes along a line that overlap a dozen others, the last one apart from all.
+    fn tree(leaf_count: usize) -> BoxTree {
+        let mut tree = BoxTree::new(leaf_count);
+        tree.refit(|leaves| {
+            for (index, leaf) in leaves.iter_mut().enumerate() {
+                let x = if index + 1 == leaf_count { 1e6 } else { index as f32 };
+                *leaf = Bounds { min: [x, 0.0, 0.0], max: [x + 6.0, 1.0, 1.0] };
+            }
+        });
+        tree
+    }
+
+    fn found(tree: &BoxTree, kernels: Kernels) -> Vec<[u32; 2]> {
+        let mut pairs = Vec::new();
+        let search = tree.search(0.5, kernels, &mut |pair| {
+            pairs.push(pair);
+            Search::Continue(())
+        });
+        assert!(search.is_continue());
+        pairs
+    }
+
+    #[test]
+    fn a_search_finds_all_near_pairs_with_a_mark_in_the_same_order() {
+        let count = 4_u32.pow(4) + 37;
+        let mut tree = tree(count as usize);
+        let near = |[a, b]: [u32; 2]| if b + 1 == count { a == b } else { b - a <= 6 };
+        let pairs = || (0..count).flat_map(|a| (a..count).map(move |b| [a, b]));
+        for kernels in Kernels::available() {
+            tree.mark(&vec![true; count as usize]);
+            let all = found(&tree, kernels);
+            assert!(all.is_sorted_by(|a, b| pair_order(*a) < pair_order(*b)), "{kernels:?}");
+            let mut sorted = all.clone();
+            sorted.sort_unstable();
+            assert_eq!(sorted, pairs().filter(|pair| near(*pair)).collect::<Vec<_>>());
+
+            let is_marked: Vec<_> = (0..count).map(|leaf| leaf % 50 == 3).collect();
+            tree.mark(&is_marked);
+            let has_mark = |pair: &[u32; 2]| pair.iter().any(|leaf| is_marked[*leaf as usize]);
+            let marked: Vec<_> = all.into_iter().filter(has_mark).collect();
+            assert_eq!(found(&tree, kernels), marked, "{kernels:?}");
+        }
     }
 }

@@ -1,7 +1,8 @@
 //! Pairs of particles that are near each other at load, and so have another contact distance, or none.
 
 use super::box_tree::Search;
-use super::tile_tree::{Query, TILE, TILE_LENGTH, TileTree};
+use super::tile::{TILE, TILE_LENGTH};
+use super::tile_tree::{Query, TileTree};
 use crate::kernels::Kernels;
 use crate::scene::model::Model;
 

@@ -1,7 +1,7 @@
 //! The law of a contact between two particles.
 
 use super::push::Push;
-use super::tile_tree::TILE_LENGTH;
+use super::tile::TILE_LENGTH;
 use crate::kernels::lanes::{PackedParticle, axes, map_axes};
 use crate::kernels::vectors::dot;
 

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::super::tile_tree::TILE;
+use super::super::tile::TILE;
 use super::nearest::{SIDE_TOLERANCE, inwards, next};
 use super::surface::Surface;
 use crate::kernels::lanes::{Lanes8, PackedParticle, Wide};

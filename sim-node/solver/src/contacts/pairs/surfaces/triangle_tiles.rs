@@ -1,7 +1,8 @@
 //! Tiles of triangles, to find those that particles come near.
 
 use super::super::box_tree::{BoxTree, Search};
-use super::super::tile_tree::{TILE, TILE_LENGTH, TileTree, take_lowest};
+use super::super::tile::{TILE, TILE_LENGTH, take_lowest};
+use super::super::tile_tree::TileTree;
 use super::placed_tile::PlacedTile;
 use super::surface::Surface;
 use crate::contacts::bounds::Bounds;
