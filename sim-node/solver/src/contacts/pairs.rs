@@ -41,7 +41,7 @@ const REACH: f32 = 1.1;
 /// are too many candidates.
 const PARTICLES_MARGIN: f32 = 0.25;
 /// The same where cloths touch as surfaces. There, candidates are found at the start of the paths, so bits depend on it.
-const SURFACES_MARGIN: f32 = 0.2;
+const SURFACES_MARGIN: f32 = 0.4;
 /// Part of the tiles with strays from which on all paths begin anew: a full search is then as fast.
 const STRAY_PART_MAX: f32 = 0.5;
 /// Largest number of candidates for each particle, on average. It bounds the time of a step in which

@@ -85,19 +85,13 @@ impl Tile {
     /// The box of where the paths begin.
     #[inline(always)]
     pub(super) fn starts<W: Wide>(&self) -> Bounds {
-        bounds_of::<W>(load_columns(&self.x))
+        bounds_of::<W>(&self.x)
     }
 
     /// The box of the displacements.
     #[inline(always)]
     pub(super) fn displacements<W: Wide>(&self) -> Bounds {
-        bounds_of::<W>(load_columns(&self.d))
-    }
-
-    /// The box of the positions after `time` displacements.
-    #[inline(always)]
-    pub(super) fn bounds_at<W: Wide>(&self, time: f32) -> Bounds {
-        bounds_of(self.positions::<W>(time))
+        bounds_of::<W>(&self.d)
     }
 }
 
@@ -106,21 +100,11 @@ fn is_within<W: Wide>(at: W, min: f32, max: f32) -> W::Mask {
     W::both(at.is_at_most(W::splat(max)), W::splat(min).is_at_most(at))
 }
 
-/// The lanes of numbers of a tile, by group and axis.
+/// The box around points. NaN is left out.
 #[inline(always)]
-fn load_columns<W: Wide>([x, y, z]: &[TileColumn; 3]) -> [[W; 3]; TILE / 8] {
-    [
-        [W::load(&x[0], 0), W::load(&y[0], 0), W::load(&z[0], 0)],
-        [W::load(&x[1], 0), W::load(&y[1], 0), W::load(&z[1], 0)],
-    ]
-}
-
-/// The box around points, by group and axis. NaN is left out.
-#[inline(always)]
-fn bounds_of<W: Wide>([first, second]: [[W; 3]; TILE / 8]) -> Bounds {
-    let (x_low, x_high) = highest(first[0], second[0]);
-    let (y_low, y_high) = highest(first[1], second[1]);
-    let (z_low, z_high) = highest(first[2], second[2]);
+fn bounds_of<W: Wide>([x, y, z]: &[TileColumn; 3]) -> Bounds {
+    let [(x_low, x_high), (y_low, y_high), (z_low, z_high)] =
+        [highest::<W>(x), highest::<W>(y), highest::<W>(z)];
     let max = greatest([x_high, y_high, z_high]);
     let min = greatest([x_low, y_low, z_low]);
     Bounds { min: map_axes(min, |axis| -axis), max }
@@ -128,8 +112,9 @@ fn bounds_of<W: Wide>([first, second]: [[W; 3]; TILE / 8]) -> Bounds {
 
 /// By lane, the largest of the negated numbers, and the largest of the numbers.
 #[inline(always)]
-fn highest<W: Wide>(first: W, second: W) -> (W, W) {
+fn highest<W: Wide>([first, second]: &TileColumn) -> (W, W) {
     let least = W::splat(f32::NEG_INFINITY);
+    let (first, second) = (W::load(first, 0), W::load(second, 0));
     // NaN leaves the right-hand side.
     let low = (-second).max_or_rhs((-first).max_or_rhs(least));
     let high = second.max_or_rhs(first.max_or_rhs(least));

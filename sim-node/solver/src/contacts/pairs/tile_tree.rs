@@ -70,9 +70,16 @@ impl TileTree {
     /// Recomputes the boxes of tiles with strays for a part of the paths: from and to these numbers of displacements.
     pub(super) fn refit(&mut self, times: [f32; 2], kernels: Kernels) {
         let Self { tiles, boxes, starts, displacements, has_stray, .. } = self;
+        kernels.run(BoundsWork { tiles, has_stray, starts, displacements });
         boxes.mark(has_stray);
-        boxes.refit(|paths| {
-            kernels.run(BoundsWork { tiles, has_stray, times, paths, starts, displacements });
+        boxes.refit(|leaves| {
+            let bounds = leaves.iter_mut().zip(starts.iter().zip(displacements.iter()));
+            for ((leaf, (start, displacement)), has_stray) in bounds.zip(has_stray) {
+                if *has_stray {
+                    let [from, to] = times.map(|time| start.moved(displacement, time));
+                    *leaf = from.union(&to);
+                }
+            }
         });
     }
 
@@ -136,12 +143,10 @@ impl LaneWork for FollowWork<'_> {
     }
 }
 
-/// Computes the boxes of the tiles with strays.
+/// Computes the boxes of positions and displacements of the tiles with strays.
 struct BoundsWork<'a> {
     tiles: &'a [Tile],
     has_stray: &'a [bool],
-    times: [f32; 2],
-    paths: &'a mut [Bounds],
     starts: &'a mut [Bounds],
     displacements: &'a mut [Bounds],
 }
@@ -151,19 +156,13 @@ impl LaneWork for BoundsWork<'_> {
 
     #[inline(always)]
     fn run<W: Wide>(self) {
-        let Self { tiles, has_stray, times: [from, to], paths, starts, displacements } = self;
-        let boxes = paths.iter_mut().zip(starts).zip(displacements);
-        for ((tile, has_stray), ((path, start), displacement)) in
-            tiles.iter().zip(has_stray).zip(boxes)
-        {
-            if !has_stray {
-                continue;
+        let Self { tiles, has_stray, starts, displacements } = self;
+        let boxes = starts.iter_mut().zip(displacements);
+        for ((tile, has_stray), (start, displacement)) in tiles.iter().zip(has_stray).zip(boxes) {
+            if *has_stray {
+                *start = tile.starts::<W>();
+                *displacement = tile.displacements::<W>();
             }
-            *start = tile.starts::<W>();
-            *displacement = tile.displacements::<W>();
-            // The product of 0 and an infinite displacement would be NaN.
-            let first = if from == 0.0 { *start } else { tile.bounds_at::<W>(from) };
-            *path = first.union(&tile.bounds_at::<W>(to));
         }
     }
 }
