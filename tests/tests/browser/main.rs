@@ -11,8 +11,6 @@
 mod access;
 mod carry;
 mod colours;
-mod drawing;
-mod effects;
 mod first_minute;
 mod forces;
 mod inspector;
@@ -22,6 +20,12 @@ mod pointer;
 mod replay;
 mod support;
 mod time;
+
+/// Effects, and the uniforms of the shaders.
+mod drawing {
+    mod effects;
+    mod uniforms;
+}
 
 /// Recordings, pictures and videos of the page.
 mod save {

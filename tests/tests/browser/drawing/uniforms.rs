@@ -1,4 +1,4 @@
-//! Drawing itself: where the shared uniforms lie in memory, and how much garbage a picture makes.
+//! Uniforms: where the browser reads the shared ones, and how much garbage a picture makes with them.
 
 use serde_json::{Value, json};
 
