@@ -38,6 +38,17 @@ pub struct SimulationResult {
     pub rejected_count: u64,
     /// The first rejected commands, at most 5.
     pub rejections: Vec<Outcome>,
+    /// The steps that left contacts out, because particles were piled up too densely.
+    pub incomplete_contacts: Option<StepCount>,
+}
+
+/// Some steps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct StepCount {
+    /// The first one.
+    pub first_step: u64,
+    /// Their number.
+    pub count: u64,
 }
 
 /// Most rejected commands to report one by one.
@@ -117,8 +128,12 @@ pub fn simulate<W: Write, E: From<WriteError>>(
                 break;
             }
         }
+        let overflow_count = solver.contact_overflow_count();
         if !solver.step_unless(stop) {
             break;
+        }
+        if solver.contact_overflow_count() > overflow_count {
+            result.count_incomplete_contacts(step);
         }
         result.steps = step;
         kept.add(step, &solver);
@@ -148,7 +163,14 @@ impl SimulationResult {
             applied_count: 0,
             rejected_count: 0,
             rejections: Vec::new(),
+            incomplete_contacts: None,
         }
+    }
+
+    fn count_incomplete_contacts(&mut self, step: u64) {
+        let steps =
+            self.incomplete_contacts.get_or_insert(StepCount { first_step: step, count: 0 });
+        steps.count += 1;
     }
 
     /// Counts a command at the boundary before `step`, and returns its outcome.

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use clap::error::ErrorKind;
-use recorder::simulation::{Job, SimulationResult, State, States, simulate};
+use recorder::simulation::{Job, SimulationResult, State, States, StepCount, simulate};
 use recorder::{
     Closing, ContentSelection, LogEnd, LogReader, OutcomeRow, PartFile, TimedCommand, WriteError,
 };
@@ -203,6 +203,7 @@ fn run_job<E: From<WriteError> + Into<anyhow::Error>>(
     let wall_ns = monotonic_ns() - before_ns;
 
     note_rejections(&result);
+    note_incomplete_contacts(&result);
     let simulated = Simulated {
         scene: &job.scene,
         first_step,
@@ -284,6 +285,16 @@ fn note_rejections(result: &SimulationResult) {
             row.client_id,
             row.sequence,
             cause(outcome)
+        ));
+    }
+}
+
+/// Reports steps that left contacts out.
+fn note_incomplete_contacts(result: &SimulationResult) {
+    if let Some(StepCount { first_step, count }) = result.incomplete_contacts {
+        output::note(&format!(
+            "warning: from step {first_step} on, the particles were piled up so densely that some contacts were left \
+             out (affected steps: {count}); more substeps or a smaller contact thickness avoid it"
         ));
     }
 }

@@ -3,7 +3,7 @@
 
 use std::fs;
 
-use integration_tests::{Sandbox, ctl};
+use integration_tests::{Finished, Sandbox, ctl};
 use recorder::{Frame, Message, OutcomeRow};
 
 use super::{frames, node, record, recorder, step, wait_for_step};
@@ -258,4 +258,24 @@ fn a_rejected_command_is_an_outcome_and_its_warning_names_the_allowed_values() {
     assert_eq!(done.code, Some(0), "{}", done.stderr);
     let expected = "unknown_parameter: there is no such parameter (allowed: gravity, damping, ";
     assert!(done.stderr.contains(expected), "{}", done.stderr);
+}
+
+#[test]
+fn contacts_that_were_left_out_are_reported() {
+    let sandbox = Sandbox::new();
+    let contact = "version = 1\n[contact]\nmode = \"particles\"\nthickness = 0.1\n";
+    let pile = contact.to_owned() + &"[[particle]]\nposition = [0, 0, 0]\n".repeat(100);
+    let simulated = |name: &str, text: &str| {
+        let scene = sandbox.write(name, text);
+        let Finished { code, stderr, .. } =
+            recorder(&sandbox, &["simulate", &scene, "--steps", "3"]);
+        assert_eq!(code, Some(0), "{stderr}");
+        stderr
+    };
+    // A pile of 100 has 4,950 pairs, and at most 800 are considered.
+    let warning = simulated("pile.toml", &pile);
+    assert!(warning.contains("from step 1 on, the particles were piled up"), "{warning}");
+    let pair = contact.to_owned() + &"[[particle]]\nposition = [0, 0, 0]\n".repeat(2);
+    let quiet = simulated("pair.toml", &pair);
+    assert!(!quiet.contains("piled up"), "{quiet}");
 }
