@@ -368,6 +368,29 @@ fn a_reader_continues_with_the_messages_of_later_steps_that_come_early() {
 }
 
 #[test]
+fn a_reader_continues_with_the_messages_before_a_last_snapshot_that_came_late() {
+    const COUNT: usize = 1000;
+    let (bytes, _) = written(PLAIN);
+    let mut log = LogReader::new(&bytes[..]).unwrap();
+    let options = LogOptions { chunk_size_bytes: 6000, ..LogOptions::default() };
+    let mut late = LogWriter::create(Vec::new(), options, log.run(), log.scene(), 0).unwrap();
+    while let Some(logged) = log.next_message().unwrap() {
+        if matches!(&logged.message, Message::Step(row) if row.step == STEPS) {
+            for _ in 0..COUNT {
+                late.write(&reset_outcome(STEPS + 1), 0).unwrap();
+            }
+        }
+        late.write(&logged.message, 0).unwrap();
+    }
+    let file = TestFile::new("late", &late.finish(&Closing::default()).unwrap());
+    let mut tape = file.open().unwrap();
+    let mut reader = FrameReader::new(LogReader::open(&file.0).unwrap());
+    tape.wind(&mut reader, STEPS).unwrap();
+    assert_eq!(reader.next_frame().unwrap(), None);
+    assert_eq!(reader.trailing_updates().len(), COUNT);
+}
+
+#[test]
 fn a_reader_continues_behind_a_damaged_chunk() {
     let (mut bytes, _) = written(PLAIN);
     let all = frames(&bytes);

@@ -249,9 +249,13 @@ impl Tape {
         step: u64,
     ) -> Result<(), ReadError> {
         let Some(SnapshotPosition { chunk, step }) = self.find(step)? else { return Ok(()) };
-        // One chunk earlier, because a batch of the recorder may contain later messages early. If that
-        // chunk is damaged, the reader ends there.
-        for chunk in [chunk.saturating_sub(1), chunk] {
+        // Messages of later steps may precede the snapshot: by a chunk, because a batch of the recorder may contain them
+        // early, and since the snapshot before, because the last one of a file may be written late. If one of these
+        // chunks is damaged, the reader ends there.
+        let early = chunk.saturating_sub(1);
+        let before = step.checked_sub(1).map(|step| self.find(step)).transpose()?.flatten();
+        let earliest = before.map_or(early, |before| before.chunk.min(early));
+        for chunk in [earliest, early, chunk] {
             frames.go_to(&self.log().chunk_start(chunk))?;
             if frames.skip_to(step)? {
                 break;

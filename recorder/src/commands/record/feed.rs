@@ -142,6 +142,7 @@ impl Feed {
         self.intake.accept_messages(messages, Now::read(), &mut self.accepted);
         self.enqueue();
         if self.is_paused && !was_paused {
+            // At the end of the file, it would have the time of what follows during the pause.
             self.push_last_snapshot();
         }
         self.end_part_early();
@@ -247,7 +248,7 @@ impl Feed {
 
     /// Records the last snapshot, if it was left out.
     fn push_last_snapshot(&mut self) {
-        if let Some(item) = self.selector.take_last_snapshot(realtime_ns()) {
+        if let Some(item) = self.selector.take_last_snapshot() {
             self.queue.push(item);
         }
     }

@@ -7,7 +7,7 @@ use integration_tests::{DEADLINE, Finished, Process, Program, Sandbox, Signal, c
 use serde_json::{Value, json};
 use sim_contract::{Action, Client};
 
-use super::{record, steps};
+use super::{outcomes, record, steps};
 
 fn recorder(sandbox: &Sandbox, args: &[&str]) -> Finished {
     Process::run(Program::Recorder, sandbox, args)
@@ -42,8 +42,8 @@ fn every_seventh_snapshot_verifies_and_nothing_counts_as_lost() {
         assert!(recorded.contains(&step), "step {step} is not in {recorded:?}");
     }
     assert_eq!(recorded.last(), Some(&200), "the file ends where the recording did");
-    // The others have a keyframe: the first step, and the first one after each round of commands. Except for the
-    // last one.
+    // The others have a keyframe, as the first step and the first one after each round of commands, or are the last
+    // one.
     let others: Vec<_> = recorded.iter().filter(|step| *step % 7 != 0).collect();
     assert!(recorded.len() < 60 && others.len() >= 8, "{recorded:?}");
     let verified = recorder(&sandbox, &["verify", "--json", &file]).json();
@@ -54,19 +54,40 @@ fn every_seventh_snapshot_verifies_and_nothing_counts_as_lost() {
 }
 
 #[test]
-fn the_last_snapshot_before_a_pause_is_recorded_although_a_command_follows() {
+fn the_last_snapshot_before_a_pause_is_recorded_at_once() {
     let sandbox = Sandbox::new();
     let file = sandbox.path("run.mcap");
     let _node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
-    let mut recording = record(&sandbox, &["-o", &file, "--every", "1000000"]);
+    let args = ["-o", &file, "--every", "1000000", "--flush-interval", "100ms"];
+    let mut recording = record(&sandbox, &args);
     recording.wait_for_line("recording from step");
     let mut client = Client::attach(&sandbox.endpoint()).unwrap();
     client.request(Action::Pause, DEADLINE).unwrap();
     let last_step = client.latest_snapshot(DEADLINE).unwrap().unwrap().header().step;
-    // It belongs to the next step, which is never made.
+    let part = format!("{file}.part");
+    wait_for("the last step", || (steps(&part).last() == Some(&last_step)).then_some(()));
+    // Its outcome belongs to the next step, which is never made.
     client.request(Action::Pin { particle: 100 }, DEADLINE).unwrap();
     recording.interrupt().success();
     assert_eq!(steps(&file).last(), Some(&last_step));
+}
+
+#[test]
+fn the_last_snapshot_is_recorded_although_a_command_follows() {
+    let sandbox = Sandbox::new();
+    let file = sandbox.path("run.mcap");
+    let _node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain", "--paused"]);
+    let args = ["-o", &file, "--every", "1000000", "--flush-interval", "100ms"];
+    let recording = record(&sandbox, &args);
+    ctl(&sandbox, &["step", "20"]);
+    // Its outcome belongs to step 21, which is never made, and is in the file long before the end.
+    ctl(&sandbox, &["pin", "100"]);
+    let part = format!("{file}.part");
+    wait_for("the outcome", || (outcomes(&part).len() >= 2).then_some(()));
+    recording.interrupt().success();
+    assert_eq!(steps(&file).last(), Some(&20));
+    let verified = recorder(&sandbox, &["verify", "--json", &file]).json();
+    assert_eq!(verified["verdict"], "identical", "{verified}");
 }
 
 #[test]

@@ -3,7 +3,6 @@
 use std::num::NonZeroU32;
 
 use recorder::{AllCounts, ContentSelection, Message, ParticleBuffer, StepRow, Topic};
-use sim_contract::clock::SECOND_NS;
 
 use crate::cli::parse::whole_number_in;
 use crate::commands::record::queue::{Content, Item};
@@ -93,20 +92,6 @@ fn period(text: &str) -> Result<NonZeroU32, String> {
 /// In a recording of commands, one keyframe of this number has particles: about one each ten seconds.
 const KEYFRAMES_PER_STATE: u32 = 10;
 
-/// Longest time for which messages of a later step may precede the last snapshot of a file. Readers look for them at
-/// most one chunk earlier, and a chunk is written after about a second at the latest.
-const OVERTAKEN_MAX_NS: u64 = SECOND_NS;
-
-/// A snapshot that was left out.
-#[derive(Debug)]
-struct LeftOut {
-    row: StepRow,
-    particles: ParticleBuffer,
-    log_time_ns: u64,
-    /// Time of the first selected message of a later step.
-    overtaken_ns: Option<u64>,
-}
-
 /// Leaves out what is not selected, and counts it.
 #[derive(Debug)]
 pub(super) struct Selector {
@@ -118,8 +103,8 @@ pub(super) struct Selector {
     keyframes_since_state: Option<u32>,
     /// Step of the newest state that a command put in place. Its particles follow from nothing else.
     in_place_step: Option<u64>,
-    /// The newest snapshot, if it was left out.
-    last_left_out: Option<LeftOut>,
+    /// The newest snapshot with the time of its reception, if it was left out.
+    last_left_out: Option<(StepRow, ParticleBuffer, u64)>,
     /// Only `left_out` is set.
     counts: AllCounts,
 }
@@ -153,23 +138,14 @@ impl Selector {
                     }
                     _ => {}
                 }
-                if !self.has(message.topic()) {
-                    return None;
-                }
-                let last = self.last_left_out.as_mut();
-                if let Some(last) = last.filter(|last| last.row.step < message.step()) {
-                    last.overtaken_ns.get_or_insert(log_time_ns);
-                }
-                Some(Content::Update(message))
+                self.has(message.topic()).then_some(Content::Update(message))
             }
             Content::Snapshot(row, particles) => {
                 let is_due = row.snapshot_index.is_none_or(|one| self.selection.has_snapshot(one));
                 let has_keyframe = self.keyframe_step == Some(row.step);
                 if !is_due && !has_keyframe {
                     self.count_snapshots(|left_out| left_out + 1);
-                    let overtaken_ns = None;
-                    self.last_left_out =
-                        Some(LeftOut { row, particles, log_time_ns, overtaken_ns });
+                    self.last_left_out = Some((row, particles, log_time_ns));
                     return None;
                 }
                 self.last_left_out = None;
@@ -179,12 +155,9 @@ impl Selector {
     }
 
     /// Returns what is recorded of the newest snapshot at the end of a file, if it was left out: a file ends
-    /// where the recording did, not up to a period before.
-    pub(super) fn take_last_snapshot(&mut self, now_ns: u64) -> Option<Item> {
-        let LeftOut { row, particles, log_time_ns, overtaken_ns } = self.last_left_out.take()?;
-        if overtaken_ns.is_some_and(|since_ns| now_ns.saturating_sub(since_ns) > OVERTAKEN_MAX_NS) {
-            return None;
-        }
+    /// where the recording did, not up to a period before. Messages of the next step may precede it in the file.
+    pub(super) fn take_last_snapshot(&mut self) -> Option<Item> {
+        let (row, particles, log_time_ns) = self.last_left_out.take()?;
         self.count_snapshots(|left_out| left_out - 1);
         Some(Item { content: self.recorded_part(row, particles), log_time_ns })
     }
@@ -276,8 +249,8 @@ mod tests {
         let selected: Vec<_> =
             (0..10).filter(|one| select(&mut selector, snapshot(*one)).is_some()).collect();
         assert_eq!(selected, [0, 3, 4, 8]);
-        assert_eq!(step_of(selector.take_last_snapshot(9)), Some(9));
-        assert_eq!(selector.take_last_snapshot(9), None);
+        assert_eq!(step_of(selector.take_last_snapshot()), Some(9));
+        assert_eq!(selector.take_last_snapshot(), None);
         let counts = selector.take_counts();
         assert_eq!((counts[Topic::Particles].left_out, counts[Topic::Steps].left_out), (5, 5));
         assert_eq!(counts[Topic::Keyframe].left_out, 1);
@@ -285,28 +258,19 @@ mod tests {
     }
 
     #[test]
-    fn a_file_ends_with_its_last_snapshot_unless_a_later_step_began_long_before() {
+    fn a_file_ends_with_its_last_snapshot_although_messages_of_the_next_step_come_before_it() {
         let mut selector = Selector::new(ContentSelection::new(NonZeroU32::new(4).unwrap(), &[]));
-        let last_step =
-            |selector: &mut Selector, now_ns| step_of(selector.take_last_snapshot(now_ns));
         for index in 0..=8 {
             select(&mut selector, snapshot(index));
         }
-        assert_eq!(last_step(&mut selector, 8), None, "the last one was selected");
-        for (time_ns, expected) in [(OVERTAKEN_MAX_NS, Some(9)), (OVERTAKEN_MAX_NS + 1, None)] {
-            select(&mut selector, snapshot(9));
-            select(&mut selector, keyframe(9));
-            // Step 10 has begun in the file.
-            select(&mut selector, keyframe(10));
-            select(&mut selector, keyframe(11));
-            assert_eq!(last_step(&mut selector, 10 + time_ns), expected);
-        }
-        select(&mut selector, snapshot(13));
-        assert_eq!(last_step(&mut selector, u64::MAX), Some(13), "nothing has overtaken it");
-        assert_eq!(last_step(&mut selector, SECOND_NS), None, "it is taken once");
-        select(&mut selector, snapshot(14));
+        assert_eq!(selector.take_last_snapshot(), None, "the last one was selected");
+        select(&mut selector, snapshot(9));
+        select(&mut selector, keyframe(10));
+        assert_eq!(step_of(selector.take_last_snapshot()), Some(9));
+        assert_eq!(selector.take_last_snapshot(), None, "it is taken once");
+        select(&mut selector, snapshot(11));
         selector.take_counts();
-        assert_eq!(last_step(&mut selector, SECOND_NS), None, "it belongs to the file before");
+        assert_eq!(selector.take_last_snapshot(), None, "it belongs to the file before");
     }
 
     #[test]
