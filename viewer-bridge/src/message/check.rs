@@ -27,7 +27,7 @@ pub fn check(command: &Command) -> Result<(), Reason> {
             within(*over_s, 0.0, GRAB_OVER_S_MAX)
         }
         Command::Throw { velocity, .. } => points(&[*velocity]),
-        Command::Brush { eye, ray, radius, delta, over_s, cap } => {
+        Command::Brush { eye, ray, radius, delta, over_s, cap, stroke: _ } => {
             points(&[*eye, *ray, *delta])?;
             direction(ray)?;
             within(*radius, 0.0, COORDINATE_MAX)?;

@@ -108,6 +108,8 @@ pub enum Command {
         over_s: f32,
         #[serde(default)]
         cap: Option<f32>,
+        #[serde(default)]
+        stroke: Option<u32>,
     },
     Push {
         center: [f32; 3],

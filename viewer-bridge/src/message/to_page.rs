@@ -282,6 +282,16 @@ impl OutcomeText {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Undoable {
+    /// A drag of a particle, from the grab on.
+    Drag,
+    /// A move of a collider or an anchor.
+    Carry,
+    /// A stroke of the brush, or one push.
+    Brush,
+    /// A pin.
+    Pin,
+    /// The removal of a pin.
+    Unpin,
     /// A cut: one stroke.
     Cut,
     /// A reset.
@@ -296,6 +306,11 @@ impl Undoable {
     /// Name for the user.
     pub(crate) fn text(self) -> &'static str {
         match self {
+            Self::Drag => "the drag",
+            Self::Carry => "the move of a solid or an anchor",
+            Self::Brush => "the push",
+            Self::Pin => "the pin",
+            Self::Unpin => "the removal of a pin",
             Self::Cut => "the cut",
             Self::Reset => "the reset",
             Self::Load => "the load of another scene",

@@ -148,7 +148,7 @@ const FROM_PAGE: [&str; 42] = [
     r#"{"type":"grab","particle":90,"target":[0.5,0.2,0.3],"over_s":0.05,"id":1}"#,
     r#"{"type":"move","particle":90,"target":[0.5,0.4,0.3]}"#,
     r#"{"type":"release","particle":90}"#,
-    r#"{"type":"brush","eye":[0,0,5],"ray":[0,0,-1],"radius":0.2,"delta":[0.01,0,0],"over_s":0.016,"cap":0.05}"#,
+    r#"{"type":"brush","eye":[0,0,5],"ray":[0,0,-1],"radius":0.2,"delta":[0.01,0,0],"over_s":0.016,"cap":0.05,"stroke":6}"#,
     r#"{"type":"push","center":[0,1,0],"radius":0.3,"delta":[0,0,0.02],"limit":0.05}"#,
     r#"{"type":"pin","particle":3}"#,
     r#"{"type":"unpin","particle":3}"#,

@@ -20,7 +20,7 @@ pub(super) fn actions(
         Command::Grab { particle, target, over_s } => Action::Grab { particle, target, over_s },
         Command::Move { particle, target, over_s } => Action::Move { particle, target, over_s },
         Command::Release { particle } => Action::Release { particle, force: false },
-        Command::Brush { eye, ray, radius, delta, over_s, cap } => {
+        Command::Brush { eye, ray, radius, delta, over_s, cap, stroke: _ } => {
             let stroke = Stroke { eye, ray, radius, delta, over_s, cap };
             let push = stroke.push(context);
             return Ok(push.into_iter().collect());

@@ -273,10 +273,12 @@ impl Link {
                 let place = Place { state: &state, colliders: shown.colliders() };
                 let object = object.at(index);
                 self.carrier.lift(client, object, place)?;
-                // To others, the whole way is one change.
-                let change =
-                    Change { step: state.header.step, client: Some(client), command: None };
-                self.undo.add_carrying(change);
+                let known = (&self.keyframes, &*self.catalog);
+                let prepared = self.undo.prepare(client, command, &state, known);
+                // The whole way is one change.
+                let step = state.header.step + 1;
+                let change = Change { step, client: Some(client), command: None };
+                self.undo.add_carrying(change, prepared);
                 Ok(())
             }
             Command::Carry { object, index, offset, over_s } => {

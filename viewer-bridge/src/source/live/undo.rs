@@ -1,4 +1,4 @@
-//! Undoes cuts, resets, loads and jumps of the pages.
+//! Undoes what pages have changed: drags, moves, pushes, pins, cuts, resets, loads and jumps.
 //!
 //! A change is undone by a rewind to the last step before it. Where the node no longer keeps that step,
 //! because another scene was loaded since, the bridge gives it the state back that it kept when the page
@@ -84,7 +84,7 @@ impl Undo {
             return None;
         }
         let source = self.source.or_else(|| catalog.source(&state.load.summary.name));
-        let is_continued = self.stack.continues(client, stroke);
+        let is_continued = self.stack.continues(client, what, stroke);
         let copy = || KeptState::copy(state, keyframes, source);
         let kept = if is_continued { None } else { copy() };
         Some(Awaited { client, what, stroke, load: state.key(), kept })
@@ -105,9 +105,9 @@ impl Undo {
         }
     }
 
-    /// Notes that a client carries something.
-    pub(super) fn add_carrying(&mut self, change: Change) {
-        self.stack.add(change);
+    /// Notes that a client carries something. A prepared one can be undone.
+    pub(super) fn add_carrying(&mut self, change: Change, prepared: Option<Awaited>) {
+        self.stack.add_made(change, prepared);
     }
 
     /// Begins to undo the newest change of a page. Returns the answer if it is refused.

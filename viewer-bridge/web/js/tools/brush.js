@@ -1,7 +1,7 @@
 // The brush: pushes all particles within a circle along with the pointer.
 
 import { clamp, subtract } from "../geometry/math.js";
-import { OVER_S, depthUnder } from "./tool.js";
+import { OVER_S, depthUnder, newStroke } from "./tool.js";
 
 /** @typedef {import("../geometry/pick.js").Pixel} Pixel */
 /** @typedef {import("./tool.js").App} App */
@@ -22,6 +22,7 @@ export class BrushTool {
     this.pointer = start;
     this.radius = radius;
     this.sentMs = performance.now();
+    this.number = newStroke();
     this.depth = depthUnder(app, start, radius) ?? app.camera.target;
   }
 
@@ -44,7 +45,7 @@ export class BrushTool {
     const { origin, direction } = camera.ray(this.before.x, this.before.y, viewport);
     commands.stream("brush", {
       eye: origin, ray: direction, radius: this.radius * unit, over_s,
-      delta: subtract(on(this.pointer), on(this.before)), cap: PUSH_PIXELS_MAX * unit * 60 * over_s,
+      delta: subtract(on(this.pointer), on(this.before)), cap: PUSH_PIXELS_MAX * unit * 60 * over_s, stroke: this.number,
     });
     this.before = this.pointer;
     this.sentMs = nowMs;

@@ -1,6 +1,7 @@
 // The cutting stroke.
 
 import { crossedSticks, projectAll } from "../geometry/pick.js";
+import { newStroke } from "./tool.js";
 
 /** @typedef {import("../geometry/pick.js").Pixel} Pixel */
 /** @typedef {import("./tool.js").App} App */
@@ -8,9 +9,6 @@ import { crossedSticks, projectAll } from "../geometry/pick.js";
 
 /** Points of a stroke that stay drawn. */
 const STROKE_POINTS_MAX = 60;
-
-/** Number of the last stroke. The cuts of a stroke are undone together. */
-let lastStroke = 0;
 
 /** Cuts every constraint that meets the pointer, whichever of the two moves. @implements {Tool} */
 export class CutTool {
@@ -27,7 +25,7 @@ export class CutTool {
     this.scene = app.simulation.scene;
     /** Constraints that were sent already. @type {Set<number>} */
     this.sent = new Set();
-    this.number = ++lastStroke;
+    this.number = newStroke();
   }
 
   /** @param {Pixel} to */

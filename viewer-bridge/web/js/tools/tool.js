@@ -14,6 +14,11 @@ export const REACH = { mouse: 18, touch: 30 };
 /** Least and greatest duration that a motion is spread over, in seconds. */
 export const OVER_S = { min: 1 / 240, max: 0.25 };
 
+/** Number of the last stroke of any tool. The commands of a stroke are undone together. */
+let lastStroke = 0;
+
+export const newStroke = () => ++lastStroke;
+
 /** The drawn particle at a pixel of the picture. @param {App} app @param {Pixel} at @param {number} reach */
 export function particleAt({ simulation, camera, renderer }, at, reach) {
   if (simulation.frame === null) return null;

@@ -1,4 +1,4 @@
-// Undo: undoes the page's last cut, reset, load or jump. The bridge knows what that is.
+// Undo: undoes what the page has changed last. The bridge knows what that is.
 
 import { find } from "./dom.js";
 import { Question } from "./prompts.js";
@@ -8,7 +8,10 @@ import { sentence } from "./banner.js";
 /** @typedef {import("../net/messages.js").OutcomeMessage} Outcome */
 
 /** Titles of the button, by the change that it undoes. @type {Record<Undoable, string>} */
-const NAMES = { cut: "the cut", reset: "the reset", load: "the load of another scene", rewind: "the jump to an earlier state" };
+const NAMES = {
+  drag: "the drag", carry: "the move of a solid or an anchor", brush: "the push", pin: "the pin", unpin: "the removal of a pin",
+  cut: "the cut", reset: "the reset", load: "the load of another scene", rewind: "the jump to an earlier state",
+};
 
 /** Tooltip of the button. @param {Undoable} what */
 export const undoTitle = (what) => `Undo ${NAMES[what]} (Ctrl+Z)`;
@@ -33,7 +36,7 @@ export class Undo {
 
   /** The reason why there is nothing to undo, or "". */
   reasonAgainst() {
-    return this.simulation.undoable === null ? "Nothing to undo: this page has not cut, reset or loaded anything." : "";
+    return this.simulation.undoable === null ? "Nothing to undo: this page has changed nothing." : "";
   }
 
   run() {

@@ -2,8 +2,9 @@
 
 use sim_contract::{Action, ColliderState, CollidersHeader, Load as OwnerLoad};
 
-use super::{Fixture, RUN_ID, actions, load};
+use super::{Fixture, PAGE, RUN_ID, actions, load, newest_text};
 use crate::message::{Command, ObjectKind};
+use crate::request::{ClientId, Request, RequestKind};
 
 /// A scene whose collider is where the node shows it.
 const BALL: &[u8] =
@@ -45,12 +46,24 @@ fn no_move_follows_a_reset_in_the_queue_of_the_node() {
 }
 
 #[test]
+fn an_undo_leads_to_the_state_before_the_object_was_lifted_and_ends_its_motion() {
+    let mut fixture = thrown();
+    assert!(matches!(next(&mut fixture, 2)[..], [Action::MoveCollider { .. }]));
+    assert_eq!(newest_text(&mut fixture.page, "undoable").unwrap()["what"], "carry");
+    fixture.command(Command::Undo { takes_others: false });
+    let to_step = Some(1);
+    assert_eq!(next(&mut fixture, 3), [Action::Rewind { to_step, back_steps: None }]);
+    assert_eq!(next(&mut fixture, 4), []);
+}
+
+#[test]
 fn what_is_refused_at_once_ends_no_motion() {
-    for refused in
-        [Command::Undo { takes_others: false }, Command::Load { scene: "no such scene".to_owned() }]
-    {
+    let nothing_to_undo = (ClientId::Page(2), Command::Undo { takes_others: false });
+    let unknown_scene = (PAGE, Command::Load { scene: "no such scene".to_owned() });
+    for (client, command) in [nothing_to_undo, unknown_scene] {
         let mut fixture = thrown();
-        fixture.command(refused);
+        let kind = RequestKind::Command { id: None, command };
+        fixture.link.handle(Request { client, kind }, &fixture.shown, &fixture.sinks);
         assert!(matches!(next(&mut fixture, 2)[..], [Action::MoveCollider { .. }]));
     }
 }

@@ -166,6 +166,49 @@ fn the_cuts_of_a_stroke_are_undone_together_and_several_changes_one_after_anothe
 }
 
 #[test]
+fn drags_and_pins_are_undone_one_after_another() {
+    let mut fixture = Fixture::start();
+    let target = [0.0; 3];
+    fixture.change(Command::Load { scene: "rope".to_owned() }, 90);
+    fixture.change(Command::Grab { particle: 1, target, over_s: 0.1 }, 100);
+    fixture.change(Command::Move { particle: 1, target, over_s: 0.1 }, 110);
+    fixture.change(Command::Release { particle: 1 }, 120);
+    fixture.change(Command::Pin { particle: 0 }, 200);
+    fixture.change(Command::Unpin { particle: 0 }, 300);
+    for (to_step, left) in [(299, "pin"), (199, "drag"), (99, "load")] {
+        fixture.undo(false);
+        fixture.answer_undo(rewind(to_step), 400, Ok(()));
+        assert_eq!(fixture.undoable(), left);
+    }
+}
+
+#[test]
+fn a_stroke_of_the_brush_is_undone_as_a_whole_and_apart_from_a_cut() {
+    let mut fixture = Fixture::start();
+    let brush = |stroke| Command::Brush {
+        eye: [0.0, 0.0, 5.0],
+        ray: [0.0, 0.0, -1.0],
+        radius: 1.0,
+        delta: [0.1, 0.0, 0.0],
+        over_s: 0.1,
+        cap: None,
+        stroke: Some(stroke),
+    };
+    fixture.change(brush(1), 100);
+    fixture.change(brush(1), 105);
+    fixture.change(cut(1), 200);
+    fixture.change(brush(1), 300);
+    for (to_step, left) in [(299, "cut"), (199, "brush")] {
+        fixture.undo(false);
+        fixture.answer_undo(rewind(to_step), 400, Ok(()));
+        assert_eq!(fixture.undoable(), left);
+    }
+    fixture.undo(false);
+    fixture.answer_undo(rewind(99), 401, Ok(()));
+    assert_eq!(fixture.undoable(), Value::Null);
+}
+
+#[test]
 fn a_state_of_another_step_and_changes_of_the_same_pause_are_named() {
     let mut fixture = Fixture::start();
     fixture.change(Command::Pin { particle: 1 }, 50);

@@ -22,11 +22,18 @@ pub(in crate::source::live) struct LoadKey {
 pub(in crate::source::live) struct Awaited {
     pub(super) client: ClientId,
     pub(super) what: Undoable,
-    /// Cuts with the same number are one stroke.
+    /// Cuts, or pushes, with the same number are one stroke.
     pub(super) stroke: Option<u32>,
     pub(super) load: LoadKey,
     /// The state when the command was sent.
     pub(super) kept: Option<KeptState>,
+}
+
+impl Awaited {
+    /// Returns `true` for another part of the same stroke.
+    fn is_continued_by(&self, what: Undoable, stroke: Option<u32>) -> bool {
+        stroke.is_some() && (self.what, self.stroke) == (what, stroke)
+    }
 }
 
 /// A change that a page can undo.
@@ -73,6 +80,14 @@ pub(in crate::source::live) struct Change {
 pub(super) fn undoable(command: &Command) -> Option<(Undoable, Option<u32>)> {
     match command {
         Command::Cut { stroke, .. } => Some((Undoable::Cut, *stroke)),
+        Command::Brush { stroke, .. } => Some((Undoable::Brush, *stroke)),
+        Command::Grab { .. } => Some((Undoable::Drag, None)),
+        Command::Lift { .. } | Command::MoveCollider { .. } | Command::MoveAnchor { .. } => {
+            Some((Undoable::Carry, None))
+        }
+        Command::Push { .. } => Some((Undoable::Brush, None)),
+        Command::Pin { .. } => Some((Undoable::Pin, None)),
+        Command::Unpin { .. } => Some((Undoable::Unpin, None)),
         Command::CutSegment { .. } | Command::CutRadius { .. } => Some((Undoable::Cut, None)),
         Command::Reset {} => Some((Undoable::Reset, None)),
         Command::Load { .. } => Some((Undoable::Load, None)),
@@ -82,11 +97,11 @@ pub(super) fn undoable(command: &Command) -> Option<(Undoable, Option<u32>)> {
 }
 
 impl Stack {
-    /// Returns `true` if a cut belongs to the stroke of the page's last change.
-    pub(super) fn continues(&self, client: ClientId, stroke: Option<u32>) -> bool {
+    /// Returns `true` if a cut or a push belongs to the stroke of the page's last change.
+    pub(super) fn continues(&self, client: ClientId, what: Undoable, stroke: Option<u32>) -> bool {
         let awaited = self.awaited.values().rev().find(|one| one.client == client);
         let last = awaited.or_else(|| self.last(client).map(|entry| &entry.made));
-        stroke.is_some() && last.is_some_and(|last| last.stroke == stroke)
+        last.is_some_and(|last| last.is_continued_by(what, stroke))
     }
 
     /// Notes a command of a page that has been sent.
@@ -100,8 +115,13 @@ impl Stack {
 
     /// Notes an applied change.
     pub(super) fn add(&mut self, change: Change) {
-        let Change { step, client, command } = change;
-        let awaited = command.and_then(|command| self.awaited.remove(&command));
+        let awaited = change.command.and_then(|command| self.awaited.remove(&command));
+        self.add_made(change, awaited);
+    }
+
+    /// Notes an applied change that its page can undo, if `awaited` says how.
+    pub(super) fn add_made(&mut self, change: Change, awaited: Option<Awaited>) {
+        let Change { step, client, .. } = change;
         // The outcome of a long load can come after the page was told that there is none.
         let client = client.or_else(|| awaited.as_ref().map(|awaited| awaited.client));
         for entry in self.entries.iter_mut().filter(|entry| Some(entry.made.client) != client) {
@@ -112,14 +132,14 @@ impl Stack {
         }
         if let Some(awaited) = awaited {
             self.push(awaited, step);
+            self.limit_size();
         }
         *self.boundary.counts.entry(client).or_default() += 1;
     }
 
     fn push(&mut self, made: Awaited, step: u64) {
-        let is_continued = made.stroke.is_some()
-            && self.last(made.client).is_some_and(|last| last.made.stroke == made.stroke);
-        if is_continued {
+        let last = self.last(made.client);
+        if last.is_some_and(|last| last.made.is_continued_by(made.what, made.stroke)) {
             return;
         }
         let (own, others): (Vec<_>, Vec<_>) =
