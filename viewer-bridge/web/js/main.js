@@ -14,7 +14,8 @@ import { Renderer } from "./gl/renderer.js";
 import { Hud } from "./ui/hud.js";
 import { Input } from "./tools/input.js";
 import { Hint, Question } from "./ui/prompts.js";
-import { parseLink } from "./ui/link.js";
+import { parseLink } from "./view/link.js";
+import { Settling } from "./view/settling.js";
 import { Overlay } from "./ui/overlay.js";
 import { Inspector } from "./panel/inspector.js";
 import { PictureButton } from "./save/picture.js";
@@ -106,7 +107,8 @@ function start(renderer) {
   const app = { simulation, camera, renderer, commands, selection: new Selection(simulation) };
   const input = new Input(renderer.canvas, app, () => controls.canChange());
   const overlay = new Overlay(find("overlay", HTMLCanvasElement), app, input);
-  const views = new Views(app, banner);
+  const settling = new Settling(app, input);
+  const views = new Views(app, banner, settling);
   const timeline = new TimelineBar(simulation, { replay: new ReplayTrack(simulation, commands), live: new LiveTrack(simulation, commands, banner) });
   const undo = new Undo(app, banner);
   const controls = new Controls(app, input, views, timeline, undo);
@@ -141,6 +143,7 @@ function start(renderer) {
     requestAnimationFrame(loop);
     const begin = performance.now();
     input.tick(nowMs);
+    settling.tick(nowMs);
     panel.tick();
     inspector.tick(nowMs);
     charts.tick();
@@ -172,7 +175,10 @@ function listenToSimulation(input) {
   simulation.on("node", (node) => banner.set("node", node.state === "alive" || simulation.isReplay ? "" : sentence(node.text || "no node is running")));
   // A live bridge at the same address has no recording.
   simulation.on("timeline", (timeline) => banner.set("incomplete", timeline?.incomplete ? sentence(`the recording is ${timeline.incomplete}`) : ""));
-  simulation.on("scene", (scene) => { document.title = `${scene.name} · Catenary`; });
+  simulation.on("scene", (scene) => {
+    document.title = `${scene.name} · Catenary`;
+    banner.dismissInfos();
+  });
   simulation.on("frame", warnOfParticles);
   simulation.on("stats", warnOfParticles);
 }

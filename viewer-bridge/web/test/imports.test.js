@@ -8,7 +8,7 @@ import { test } from "node:test";
 
 const ROOT = new URL("../js/", import.meta.url).pathname;
 /** Each folder, with the folders in it, may import from itself and from the folders before it. */
-const LAYERS = ["geometry", "net", "state", "gl", "tools", "ui", "legend", "save", "timeline", "panel", "."];
+const LAYERS = ["geometry", "net", "state", "gl", "tools", "view", "ui", "legend", "save", "timeline", "panel", "."];
 
 const modules = readdirSync(ROOT, { recursive: true, encoding: "utf8" }).filter((path) => path.endsWith(".js"));
 

@@ -98,7 +98,6 @@ pub(super) const FILES: &[(&str, &[u8])] = files![
     "js/ui/format.js",
     "js/ui/hud.js",
     "js/ui/keys.js",
-    "js/ui/link.js",
     "js/ui/overlay.js",
     "js/ui/prompts.js",
     "js/ui/save.js",
@@ -106,6 +105,8 @@ pub(super) const FILES: &[(&str, &[u8])] = files![
     "js/ui/undo.js",
     "js/ui/units.js",
     "js/ui/views.js",
+    "js/view/link.js",
+    "js/view/settling.js",
     "js/viewer.js",
 ];
 

@@ -1,7 +1,7 @@
 // The boxes that views of a scene show: the first one with the space that the scene will move into, a fitted one
 // without.
 
-import { add, addScaled, boxOf, dot, length, scale, subtract } from "../geometry/math.js";
+import { add, addScaled, boxOf, dot, length, rotate, scale, subtract } from "../geometry/math.js";
 import { PIN } from "../net/wire.js";
 import { polesOf } from "./shapes.js";
 
@@ -106,6 +106,15 @@ export function heldBox(simulation) {
   return positions.length === 0 ? simulation.box() : boxOf(positions);
 }
 
+/** True if nothing holds some part of the scene. @param {import("./simulation.js").Simulation} simulation */
+export function hasFreePart({ scene, topology, pins }) {
+  if (scene === null || topology === null) return false;
+  if (pins.size === 0) return true;
+  const parts = partsOf(scene, topology.isGone);
+  const held = new Set([...pins.keys()].map((particle) => parts[particle]));
+  return parts.some((part) => !held.has(part));
+}
+
 /** For each particle, a particle that stands for all that intact constraints connect with it. @param {import("../net/wire.js").Scene} scene @param {Uint8Array} isGone */
 function partsOf({ particleCount, ends }, isGone) {
   const parts = Uint32Array.from({ length: particleCount }, (_, p) => p);
@@ -135,18 +144,25 @@ function includeSolid(box, [center, reach], middle, size) {
 
 /** Center and radius of a bounding sphere of a solid; infinite for a plane. @param {Collider} one @param {ColliderMesh | undefined} mesh @returns {[Vec3, number]} */
 function boundingSphere(one, mesh) {
-  if (one.shape === "mesh" && mesh) return [one.center, reachOf(mesh)];
+  if (one.shape === "mesh" && mesh) {
+    const { center, reach } = sphereOf(mesh);
+    return [add(one.center, rotate(one.rotation, center)), reach];
+  }
   if (one.shape === "sphere") return [one.center, one.radius];
   if (one.shape === "box") return [one.center, length(one.halfExtents)];
   if (one.shape === "capsule") return [scale(add(one.a, one.b), 0.5), length(subtract(one.b, one.a)) / 2 + one.radius];
   return [[0, 0, 0], Infinity];
 }
 
-/** The greatest distance of a vertex from the center. @param {ColliderMesh} mesh */
-function reachOf({ vertices }) {
+/** The sphere around the middle of the box of a mesh, in its own coordinates. @param {ColliderMesh} mesh */
+function sphereOf({ vertices }) {
+  const { min, max } = boxOf(vertices);
+  const center = scale(add(min, max), 0.5);
   let square = 0;
-  for (let at = 0; at < vertices.length; at += 3) square = Math.max(square, vertices[at] ** 2 + vertices[at + 1] ** 2 + vertices[at + 2] ** 2);
-  return Math.sqrt(square);
+  for (let at = 0; at < vertices.length; at += 3) {
+    square = Math.max(square, (vertices[at] - center[0]) ** 2 + (vertices[at + 1] - center[1]) ** 2 + (vertices[at + 2] - center[2]) ** 2);
+  }
+  return { center, reach: Math.sqrt(square) };
 }
 
 /** @param {Box} box @param {number} room */

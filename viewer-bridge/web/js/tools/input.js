@@ -53,8 +53,9 @@ export class Input {
     this.longPress = 0;
     /** The press that is a click so far. @type {Pixel | null} */
     this.click = null;
-    /** Called when a tool begins to change the simulation. */
+    /** Called when a tool begins to change the simulation; how often that was. */
     this.onTouch = () => {};
+    this.touches = 0;
     this.listen();
   }
 
@@ -95,7 +96,10 @@ export class Input {
     this.tool = this.begin(event, at);
     const isView = this.tool instanceof ViewTool;
     this.click = event.button === 0 && (isView || this.tool instanceof PressTool) && (this.mode === "grab" || !this.canChange()) ? at : null;
-    if (!isView) this.onTouch();
+    if (!isView) {
+      this.touches += 1;
+      this.onTouch();
+    }
     if (event.pointerType === "touch" && this.tool instanceof PressTool) this.waitForLongPress(this.tool);
     this.app.renderer.isDirty = true;
   }

@@ -40,6 +40,11 @@ export class Banner {
     return this.element.textContent ?? "";
   }
 
+  /** Removes notices of what went well: they belong to the scene before. */
+  dismissInfos() {
+    for (const notice of this.notices.querySelectorAll(".is-info")) notice.remove();
+  }
+
   /** @param {string} text @param {string} [level] "info", "warning" or "error" */
   notify(text, level = "info") {
     this.history.push(text);

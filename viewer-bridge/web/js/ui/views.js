@@ -1,23 +1,27 @@
 // The view: display toggles, first view of a scene, links.
 
 import { find } from "./dom.js";
-import { firstViewBox, fittedBox } from "../state/framing.js";
-import { formatLink } from "./link.js";
+import { firstViewBox, fittedBox, hasFreePart } from "../state/framing.js";
+import { formatLink } from "../view/link.js";
 
-/** @typedef {import("./link.js").CameraPose} CameraPose */
+/** @typedef {import("../view/link.js").CameraPose} CameraPose */
+/** @typedef {import("../view/settling.js").Settling} Settling */
 
 /** Yaw and pitch of the first view, in radians. */
 const FIRST_VIEW = { yaw: 0.42, pitch: 0.16 };
+/** Pitch of a scene of which something will lie on the ground. */
+const PITCH_OF_FALLING = 0.42;
 /** Shapes that effects draw as solid bodies. */
 const SOLID_SHAPES = new Set(["rope", "ragdoll"]);
 /** Limit on particles up to which scenes without a surface show them. */
 const SHOW_PARTICLES_MAX = 400;
 
 export class Views {
-  /** @param {import("../tools/tool.js").App} app @param {import("./banner.js").Banner} banner */
-  constructor(app, banner) {
+  /** @param {import("../tools/tool.js").App} app @param {import("./banner.js").Banner} banner @param {Settling} settling */
+  constructor(app, banner, settling) {
     this.app = app;
     this.banner = banner;
+    this.settling = settling;
     /** Toggles set by the user. They persist across scenes. @type {Map<string, boolean>} */
     this.chosen = new Map();
     /** The pose of a link, for the first scene only. @type {CameraPose | null} */
@@ -26,8 +30,6 @@ export class Views {
     this.poseOfScene = null;
     this.isFramed = false;
     this.isFollowing = false;
-    /** Target and distance of the last framing: a user who has changed neither sees a reset scene whole. @type {number[]} */
-    this.framed = [];
     /** The step from which a reset shows. @type {number | null} */
     this.resetStep = null;
     this.buttons = [...find("toggles", HTMLElement).querySelectorAll("button")];
@@ -64,35 +66,30 @@ export class Views {
     const { camera, renderer, simulation } = this.app;
     const { width, height } = renderer.viewport;
     camera.yaw = FIRST_VIEW.yaw;
-    camera.pitch = FIRST_VIEW.pitch;
+    camera.pitch = simulation.ground !== null && hasFreePart(simulation) ? PITCH_OF_FALLING : FIRST_VIEW.pitch;
     camera.frame(firstViewBox(simulation), width / height);
-    this.framed = this.framing();
+    // A scene without pins and without ground falls out of view, so the camera follows it.
+    this.isFollowing = !camera.isFlat && simulation.frame !== null && simulation.ground === null && simulation.pins.size === 0;
+    this.settling.begin(!this.isFollowing);
     if (this.linkedPose !== null && simulation.frame !== null) {
       Object.assign(camera, this.linkedPose);
       this.linkedPose = null;
       this.isFramed = true;
     }
-    // A scene without pins and without ground falls out of view, so the camera follows it.
-    this.isFollowing = !camera.isFlat && simulation.frame !== null && simulation.ground === null && simulation.pins.size === 0;
     renderer.isDirty = true;
-  }
-
-  framing() {
-    const { camera } = this.app;
-    return [...camera.target, camera.distance];
   }
 
   /** Fills the picture with the scene as it is now, from the current direction. */
   fit() {
-    this.frame(fittedBox(this.app.simulation));
+    this.frame(fittedBox(this.app.simulation), false);
   }
 
-  /** @param {import("../geometry/math.js").Box} box */
-  frame(box) {
+  /** @param {import("../geometry/math.js").Box} box @param {boolean} isWatched the view follows what the scene becomes */
+  frame(box, isWatched) {
     const { camera, renderer } = this.app;
     const { width, height } = renderer.viewport;
     camera.frame(box, width / height);
-    this.framed = this.framing();
+    this.settling.begin(isWatched);
     this.isFramed = true;
     renderer.isDirty = true;
   }
@@ -105,8 +102,10 @@ export class Views {
     }
     if (this.resetStep !== null && simulation.frame !== null && (simulation.isReplay || simulation.frame.step >= this.resetStep)) {
       this.resetStep = null;
-      if (this.isFollowing || String(this.framed) === String(this.framing())) this.frame(firstViewBox(simulation));
+      // A user who has not changed the view sees a reset scene whole.
+      if (this.isFollowing || this.settling.isOwn()) this.frame(firstViewBox(simulation), !this.isFollowing);
     }
+    this.settling.follow();
     if (!this.isFollowing || this.app.selection.isFollowed) return;
     const { min, max } = simulation.box();
     camera.target = [(min[0] + max[0]) / 2, (min[1] + max[1]) / 2, (min[2] + max[2]) / 2];

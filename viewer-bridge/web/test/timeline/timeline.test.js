@@ -2,7 +2,7 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { formatLink, parseLink } from "../../js/ui/link.js";
+import { formatLink, parseLink } from "../../js/view/link.js";
 import { Scale, SeekGate, clockText, marksByPixel } from "../../js/timeline/timeline.js";
 
 test("a step and its position on the timeline convert back, including at both ends", () => {
