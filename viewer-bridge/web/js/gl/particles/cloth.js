@@ -38,13 +38,13 @@ const NO_FLAT_PLACE = "vec2 flat_place(uint vertex) { return vec2(0.0); }\n";
 
 /**
  * Defines weave(place, position): the brightness of the threads, around 1. A thread that lies on top is bright
- * in its middle. The threads fade out before they are finer than the pixels, and broader stripes remain; both
+ * in its middle. The threads fade out before pixels could alias them, and broader stripes take their place; both
  * fade where the surface could not be laid flat.
  */
 const WEAVE = `
 float fading(vec2 cell) {
   vec2 width = fwidth(cell);
-  return 1.0 - smoothstep(0.25, 0.6, max(width.x, width.y));
+  return 1.0 - smoothstep(0.12, 0.3, max(width.x, width.y));
 }
 float weave(vec2 place, vec3 at) {
   vec4 flat_rate = vec4(dFdx(place), dFdy(place));
@@ -58,10 +58,11 @@ float weave(vec2 place, vec3 at) {
   float across = is_weft ? inside.y : inside.x;
   float along = is_weft ? inside.x : inside.y;
   float height = cos(across * 3.1416) * (0.65 + 0.35 * cos(along * 3.1416));
-  float threads = (height - 0.56) * 0.42 * fading(cell);
+  float near = fading(cell);
+  float threads = (height - 0.56) * 0.42 * near;
   vec2 stripe = place / (u_thread * 16.0);
   vec2 ridge = abs(fract(stripe) - 0.5);
-  float stripes = (smoothstep(0.44, 0.47, ridge.x) + smoothstep(0.44, 0.47, ridge.y)) * -0.14 * fading(stripe * 4.0);
+  float stripes = (smoothstep(0.44, 0.47, ridge.x) + smoothstep(0.44, 0.47, ridge.y)) * -0.1 * fading(stripe * 4.0) * (1.0 - near);
   return 1.0 + faith * (threads + stripes);
 }
 `;
