@@ -37,7 +37,10 @@ test("arrows move between the cards of the menu, and stay within it", () => {
 });
 
 test("the hint names what the scene has, and no right button on a touch screen", () => {
-  assert.match(hintText(true, false), /cloth.*Right-drag/);
-  assert.match(hintText(false, false), /particle/);
-  assert.doesNotMatch(hintText(true, true), /Right/);
+  const hint = (/** @type {string[]} */ ...shapes) => hintText(shapes.map((shape) => ({ shape })), false);
+  assert.match(hint("cloth", "cloth"), /the cloth.*Right-drag/);
+  assert.match(hint("bridge"), /the bridge/);
+  assert.match(hint("cloth", "ragdoll"), /anything/);
+  assert.match(hint(), /particle/);
+  assert.doesNotMatch(hintText([{ shape: "cloth" }], true), /Right/);
 });

@@ -12,10 +12,11 @@ test("the delay before reconnecting doubles up to 5 s, plus up to half at random
 });
 
 test("the text of a final refusal says what to do", () => {
-  assert.match(closedText(4401, ""), /token/);
-  assert.match(closedText(4426, "2"), /Reload/);
-  assert.match(closedText(1013, ""), /Close one/);
-  assert.match(closedText(1006, ""), /No connection/);
+  assert.match(closedText(4401, "", false), /requires a token/);
+  assert.match(closedText(4401, "", true), /token.*wrong/);
+  assert.match(closedText(4426, "2", false), /Reload/);
+  assert.match(closedText(1013, "", false), /Close one/);
+  assert.match(closedText(1006, "", false), /No connection/);
 });
 
 test("an outcome goes to its caller, and a refusal also to the user", () => {

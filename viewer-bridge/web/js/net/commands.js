@@ -1,13 +1,13 @@
 // Sends commands, and routes their outcomes to the callers by id.
 
 /** @typedef {import("./messages.js").OutcomeMessage} Outcome */
-/** @typedef {(outcome: Outcome) => void} OnOutcome */
+/** Returns true if it has told the user of a refusal. @typedef {(outcome: Outcome) => boolean | void} OnOutcome */
 
 /** Limit on commands without an outcome yet; the oldest callback is dropped beyond it. */
 const WAITING_MAX = 1024;
 
 export class Commands {
-  /** @param {(message: object) => boolean} send @param {(outcome: Outcome) => void} onRefused receives the outcome of every command that was not applied */
+  /** @param {(message: object) => boolean} send @param {(outcome: Outcome) => void} onRefused receives the outcome of a command that was not applied, unless its caller has told the user */
   constructor(send, onRefused) {
     this.send = send;
     this.onRefused = onRefused;
@@ -35,8 +35,8 @@ export class Commands {
   receive(outcome) {
     const onOutcome = outcome.id === null ? undefined : this.waiting.get(outcome.id);
     if (outcome.id !== null) this.waiting.delete(outcome.id);
-    onOutcome?.(outcome);
-    if (outcome.status !== "applied") this.onRefused(outcome);
+    const isTold = onOutcome?.(outcome) === true;
+    if (outcome.status !== "applied" && !isTold) this.onRefused(outcome);
   }
 
   /** Drops all callbacks: a lost connection brings no more outcomes. */

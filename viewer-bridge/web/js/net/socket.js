@@ -27,8 +27,9 @@ const FINAL_CODES = new Set([4400, 4401, 4404, 4426]);
  */
 export const delayBefore = (failures, random) => Math.min(DELAY_MAX_MS, FIRST_DELAY_MS * 2 ** failures) * (1 + random / 2);
 
-/** A message for the user about a closed connection. @param {number} code @param {string} reason */
-export function closedText(code, reason) {
+/** A message for the user about a closed connection. @param {number} code @param {string} reason @param {boolean} hasToken the page has sent a token */
+export function closedText(code, reason, hasToken) {
+  if (code === 4401 && hasToken) return "The token in this address is wrong, or of an earlier start of the bridge. Open the address that it printed last.";
   if (code === 4401) return "This bridge requires a token. Open the full address that it printed, including everything after the “#”.";
   if (code === 4404) return `This recording cannot be shown: ${reason}.`;
   if (code === 4426) return `The page and the bridge have different versions (${reason}). Reload the page.`;
@@ -80,7 +81,7 @@ export class Connector {
   closed(socket, code, reason) {
     if (socket !== this.socket) return;
     this.socket = null;
-    const text = closedText(code, reason);
+    const text = closedText(code, reason, this.token !== null);
     if (FINAL_CODES.has(code)) return this.change({ state: "refused", text });
     const delay = delayBefore(this.failures++, Math.random());
     this.timer = setTimeout(() => this.connect(), delay);

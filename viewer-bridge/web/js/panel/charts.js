@@ -152,9 +152,11 @@ export class Charts {
   /** @returns {import("./plot.js").Window} */
   window() {
     const { simulation } = this.app;
-    const to = this.heldAt ?? this.now;
+    const span = Number(this.span.value);
+    // Nothing is before time 0.
+    const to = Math.max(this.heldAt ?? this.now, span);
     const pace = simulation.isReplay ? simulation.playback?.rate ?? 1 : simulation.stats?.timeScale ?? 1;
-    return { from: to - Number(this.span.value), to, cursor: this.cursor, gap: GAP_S * Math.max(1, pace || 1) };
+    return { from: to - span, to, cursor: this.cursor, gap: GAP_S * Math.max(1, pace || 1) };
   }
 
   redraw() {

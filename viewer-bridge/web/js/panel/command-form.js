@@ -52,9 +52,10 @@ export class CommandForm {
     this.answer.textContent = "";
     if ("fault" in message) return this.say(message.fault, true);
     commands.run(command, message.fields, ({ status, step, applied, text, reason }) => {
-      if (this.choice.value !== command) return;
+      if (this.choice.value !== command) return false;
       if (status === "applied") this.say(step === null ? "Nothing to do." : `Applied in step ${step}${applied > 1 ? ` (${applied} parts)` : ""}.`, false);
       else this.say(sentence(text || reason), true);
+      return true;
     });
   }
 

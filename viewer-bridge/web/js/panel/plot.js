@@ -16,6 +16,14 @@ export class Plot {
     this.spec = spec;
     this.canvas = make("canvas", { "aria-hidden": "true" });
     this.output = make("output", { "aria-live": "off" });
+    /** The values of the lines, in their colours. */
+    this.values = spec.lines.map(({ color }) => {
+      const value = make("span");
+      value.style.setProperty("--swatch", color.startsWith("--") ? `var(${color})` : color);
+      return value;
+    });
+    this.output.classList.toggle("has-swatches", this.values.length > 1);
+    this.output.append(...this.values);
     this.element = make("div", { class: "plot" }, make("h3", {}, spec.title, this.output), this.canvas);
     this.lastTop = 0;
     /** The lines while the plots are held: copies. @type {Line[] | null} */
@@ -32,14 +40,26 @@ export class Plot {
   }
 
   /** The values at a time, with the names of the lines. @param {number} time @param {number} reach */
+  textsAt(time, reach) {
+    return this.lines.map(({ name, series }) => `${name} ${readable(series.near(time, reach), this.spec.unit())}`);
+  }
+
+  /** @param {number} time @param {number} reach */
   textAt(time, reach) {
-    return this.lines.map(({ name, series }) => `${name} ${readable(series.near(time, reach), this.spec.unit())}`).join(", ");
+    return this.textsAt(time, reach).join(", ");
+  }
+
+  /** @param {string[]} texts */
+  show(texts) {
+    texts.forEach((text, index) => {
+      const shown = index < texts.length - 1 ? `${text}, ` : text;
+      if (this.values[index].textContent !== shown) this.values[index].textContent = shown;
+    });
   }
 
   /** @param {Window} window */
   draw({ from, to, cursor, gap }) {
-    const text = cursor !== null ? this.textAt(cursor, gap) : this.held === null && this.spec.text !== null ? this.spec.text() : this.textAt(to, Infinity);
-    if (this.output.textContent !== text) this.output.textContent = text;
+    this.show(cursor !== null ? this.textsAt(cursor, gap) : this.held === null && this.spec.text !== null ? [this.spec.text()] : this.textsAt(to, Infinity));
     const { context, width, height } = sharpContext(this.canvas);
     const style = getComputedStyle(this.canvas);
     const color = (/** @type {string} */ name) => (name.startsWith("--") ? style.getPropertyValue(name) : name);

@@ -2,10 +2,14 @@
 
 import { find } from "./dom.js";
 
-/** Text of the hint. @param {boolean} hasSurface @param {boolean} isTouch */
-export function hintText(hasSurface, isTouch) {
-  const thing = hasSurface ? "Drag the cloth." : "Drag any particle.";
-  return isTouch ? thing : `${thing} Right-drag cuts it.`;
+/** What the shapes of scenes are called. @type {Record<string, string>} */
+const NAMES = { cloth: "the cloth", rope: "the rope", bridge: "the bridge", web: "the web", ragdoll: "the ragdoll" };
+
+/** Text of the hint. @param {{ shape: string }[]} shapes of the scene @param {boolean} isTouch */
+export function hintText(shapes, isTouch) {
+  const kinds = [...new Set(shapes.map((one) => one.shape))];
+  const thing = kinds.length === 0 ? "any particle" : kinds.length === 1 ? NAMES[kinds[0]] ?? "it" : "anything";
+  return isTouch ? `Drag ${thing}.` : `Drag ${thing}. Right-drag cuts it.`;
 }
 
 /** A hint that disappears for good at the first use of a tool. */
@@ -17,7 +21,7 @@ export class Hint {
     const show = () => {
       const { scene, frame } = app.simulation;
       this.element.hidden = this.isTouched || scene === null || frame === null || !input.canChange();
-      if (scene !== null) this.element.textContent = hintText(scene.triangleCount > 0, matchMedia("(pointer: coarse)").matches);
+      if (scene !== null) this.element.textContent = hintText(scene.shapes, matchMedia("(pointer: coarse)").matches);
     };
     for (const topic of /** @type {const} */ (["scene", "frame", "node", "hello", "connection"])) app.simulation.on(topic, show);
     input.onTouch = () => {

@@ -12,8 +12,8 @@ test("the timeline shows the last seconds, less where the past is shorter, and e
 });
 
 test("the page says if the node went on from another state than the one on show", () => {
-  const outcome = { state_step: 480 };
-  assert.deepEqual(goneOnText(480, outcome, 240), { text: "The simulation goes on from 0:02.000.", level: "info" });
+  const outcome = { step: 1080, state_step: 480 };
+  assert.deepEqual(goneOnText(480, outcome, 240), { text: "The simulation goes on from the state of 2.5 s ago.", level: "info" });
   const { text, level } = goneOnText(492, outcome, 240);
   assert.equal(level, "warning");
   assert.match(text, /no longer keeps step 492.*step 480, 0\.050 s earlier.*--history/);
