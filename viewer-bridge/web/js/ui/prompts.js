@@ -2,7 +2,7 @@
 
 import { find } from "./dom.js";
 
-/** What the shapes of scenes are called. @type {Record<string, string>} */
+/** Names of the shapes of scenes. @type {Record<string, string>} */
 const NAMES = { cloth: "the cloth", rope: "the rope", bridge: "the bridge", web: "the web", ragdoll: "the ragdoll" };
 
 /** Text of the hint. @param {{ shape: string }[]} shapes of the scene @param {boolean} isTouch */
