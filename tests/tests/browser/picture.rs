@@ -125,6 +125,26 @@ impl ShownStep {
 
 #[test]
 #[ignore = "needs Chromium"]
+fn the_view_follows_a_figure_that_has_fallen_down() {
+    let mut rig = Rig::new(&["ragdoll", "--paused"], "");
+    let before = rig.tab.number("viewer.camera.distance");
+    rig.tab.key(' ');
+    rig.tab.wait(&format!("viewer.camera.distance < 0.85 * {before}"));
+    // The glide takes less than a second.
+    let step = rig.tab.number("viewer.step");
+    rig.tab.wait(&format!("viewer.step > {step} + 90"));
+    let state = rig.pause();
+    let camera = rig.tab.camera();
+    let area = camera.area();
+    for particle in &state.particles {
+        let [x, y] = camera.project(particle.position);
+        let [x, y] = [(x - area.x) / area.width, (y - area.y) / area.height];
+        assert!((0.0..1.0).contains(&x) && (0.0..1.0).contains(&y), "a joint is at {x}, {y}");
+    }
+}
+
+#[test]
+#[ignore = "needs Chromium"]
 fn fit_view_ignores_what_has_fallen_away_and_a_reset_restores_the_first_view() {
     let mut rig = Rig::new(&["rope", "--paused"], "");
     let view = "JSON.stringify([viewer.camera.target, viewer.camera.distance].flat().map(one => one.toPrecision(4)))";

@@ -61,6 +61,33 @@ fn ctrl_z_undoes_a_stroke_of_cuts_and_a_reset_one_after_the_other() {
 
 #[test]
 #[ignore = "needs Chromium"]
+fn a_drag_is_undone_and_not_the_load_before_it() {
+    let mut rig = Rig::new(&["curtain"], "");
+    rig.tab.key(']');
+    rig.tab.wait("viewer.scene !== 'curtain' && viewer.step > 60");
+    let scene = rig.tab.evaluate("viewer.scene");
+    let before = rig.pause();
+    let free = before.particles.len() - 1;
+    let from = rig.tab.camera().project(before.particles[free].position);
+    let to = [from[0] - 40.0, from[1] - 40.0];
+    rig.tab.press(from, Button::Left);
+    rig.tab.stroke(from, to, 6);
+    rig.tab.wait("viewer.grabbed !== null && viewer.unanswered === 0");
+    rig.step(20);
+    rig.tab.release(to);
+    rig.tab.wait("viewer.grabbed === null && viewer.unanswered === 0");
+    let dragged = rig.settled();
+    assert_ne!(dragged.particles[free].position, before.particles[free].position);
+
+    rig.tab.ctrl_key('z');
+    rig.wait_for_state("the state before the drag", is_like(&before));
+    notice(&rig, "Undid the drag.");
+    assert_eq!(rig.tab.evaluate("viewer.scene"), scene);
+    assert_eq!(rig.tab.evaluate("document.querySelector('#undo').disabled"), false);
+}
+
+#[test]
+#[ignore = "needs Chromium"]
 fn loads_by_a_link_and_by_digit_keys_are_undone_at_any_rate() {
     let mut rig = Rig::new(&["curtain"], "scene=rope");
     rig.tab.wait("document.querySelector('#question').checkVisibility() && viewer.step > 120");
