@@ -15,7 +15,7 @@ export function rangeOfLast(first, last, seconds, rateHz) {
 
 /** Text for the user after the page has gone on from an earlier state. @param {number} step the state that it showed @param {Outcome} outcome @param {number} rateHz */
 export function goneOnText(step, { step: now, state_step }, rateHz) {
-  // The clock does not go back, so its time there would mislead.
+  // The clock goes on from the present, so the time of the state on it would mislead.
   const ago = (((now ?? step) - step) / rateHz).toFixed(1);
   if (state_step === undefined || state_step === step) return { text: `The simulation goes on from the state of ${ago} s ago.`, level: "info" };
   const earlier = ((step - state_step) / rateHz).toPrecision(2);

@@ -53,8 +53,9 @@ export class Input {
     this.longPress = 0;
     /** The press that is a click so far. @type {Pixel | null} */
     this.click = null;
-    /** Called when a tool begins to change the simulation; how often that was. */
+    /** Called when a tool begins to change the simulation. */
     this.onTouch = () => {};
+    /** Number of tools that have begun to change the simulation. */
     this.touches = 0;
     this.listen();
   }
