@@ -11,6 +11,7 @@ mod patch;
 mod paths;
 mod publish;
 mod pulls;
+mod rows;
 mod strays;
 mod survey;
 mod workers;
@@ -210,7 +211,7 @@ impl ParticleStore {
     /// Location of a particle, until the next [`Configured::Moved`].
     pub(crate) fn location(&self, particle: u32) -> Location {
         if let Some(Found { sheet, place }) = find_sheet(&self.sheets, particle) {
-            return Location::in_sheet(sheet, self.patches[sheet].particle_index(place));
+            return Location::in_sheet(sheet, self.patches[sheet].rows.particle_index(place));
         }
         let Some(index) = self.graph.find(particle) else {
             unreachable!("particle {particle} is neither in a sheet nor in the graph")
@@ -222,7 +223,7 @@ impl ParticleStore {
     pub(crate) fn position(&self, location: Location) -> [f32; 3] {
         match location.sheet() {
             None => self.graph.position(location.index()),
-            Some(sheet) => self.patches[sheet].position(location.index()),
+            Some(sheet) => self.patches[sheet].rows.position(location.index()),
         }
     }
 
@@ -230,14 +231,16 @@ impl ParticleStore {
     pub(crate) fn displacement(&self, location: Location) -> [f32; 3] {
         match location.sheet() {
             None => self.graph.displacement(location.index()),
-            Some(sheet) => self.patches[sheet].displacement(location.index()),
+            Some(sheet) => self.patches[sheet].rows.displacement(location.index()),
         }
     }
 
     pub(crate) fn set_displacement(&mut self, location: Location, displacement: [f32; 3]) {
         match location.sheet() {
             None => self.graph.set_displacement(location.index(), displacement),
-            Some(sheet) => self.patches[sheet].set_displacement(location.index(), displacement),
+            Some(sheet) => {
+                self.patches[sheet].rows.set_displacement(location.index(), displacement)
+            }
         }
     }
 
@@ -248,9 +251,9 @@ impl ParticleStore {
         match location.sheet() {
             None => self.graph.packed_particle(index),
             Some(sheet) => {
-                let patch = &self.patches[sheet];
-                let ([x, y, z], [dx, dy, dz]) = (patch.position(index), patch.displacement(index));
-                PackedParticle([x, y, z, patch.inverse_mass(index), dx, dy, dz, 0.0])
+                let rows = &self.patches[sheet].rows;
+                let ([x, y, z], [dx, dy, dz]) = (rows.position(index), rows.displacement(index));
+                PackedParticle([x, y, z, rows.inverse_mass(index), dx, dy, dz, 0.0])
             }
         }
     }
@@ -259,7 +262,7 @@ impl ParticleStore {
     pub(crate) fn predicted(&self, location: Location) -> [f32; 3] {
         match location.sheet() {
             None => self.graph.predicted(location.index()),
-            Some(sheet) => self.patches[sheet].predicted(location.index()),
+            Some(sheet) => self.patches[sheet].rows.predicted(location.index()),
         }
     }
 
@@ -272,7 +275,7 @@ impl ParticleStore {
     ) {
         match location.sheet() {
             None => self.graph.set_position(location.index(), position),
-            Some(sheet) => self.patches[sheet].set_position(location.index(), position),
+            Some(sheet) => self.patches[sheet].rows.set_position(location.index(), position),
         }
         self.set_displacement(location, displacement);
     }
@@ -300,7 +303,7 @@ impl ParticleStore {
     pub(crate) fn set_root(&mut self, TetherPlace { particle, slot }: TetherPlace, root: [f32; 3]) {
         match particle.sheet() {
             None => self.graph.tether_mut(particle.index(), slot).root = root,
-            Some(sheet) => self.patches[sheet].set_root(particle.index(), slot, root),
+            Some(sheet) => self.patches[sheet].rows.set_root(particle.index(), slot, root),
         }
     }
 
@@ -312,7 +315,9 @@ impl ParticleStore {
     ) {
         match particle.sheet() {
             None => self.graph.tether_mut(particle.index(), slot).length = length,
-            Some(sheet) => self.patches[sheet].set_tether_length(particle.index(), slot, length),
+            Some(sheet) => {
+                self.patches[sheet].rows.set_tether_length(particle.index(), slot, length)
+            }
         }
     }
 }

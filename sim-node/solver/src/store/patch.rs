@@ -1,19 +1,11 @@
 //! A structured patch: a cloth or a rope, row by row, without indices between its numbers.
-//!
-//! A row is a sequence of fields of equal length: x, y, z of the positions, the inverse masses, x,
-//! y, z of the displacements, then fields that only some scenes have, then the constraints that
-//! begin in the row, family by family. A constraint between two rows combines eight columns of one
-//! row with eight of the other; columns of constraints within a row are separated in registers.
 
 mod band;
 mod band_forces;
 mod bend_layout;
 mod bends;
-mod ends;
 mod measure;
-mod paths;
-mod row;
-mod row_layout;
+mod sheet_layout;
 mod span;
 mod wind;
 
@@ -22,12 +14,13 @@ use std::ops::Range;
 use band::{Band, PassSweep, SweepWork};
 use band_forces::SheetForces;
 use bend_layout::BendLayout;
-use row_layout::{LINE_LENGTH, RowLayout, STATE_FIELDS};
+use sheet_layout::{SheetLayout, band_count};
 use span::Span;
 use wind::SheetWindWork;
 
 use super::layout::Layout;
 use super::publish::{PublishedMotion, publish};
+use super::rows::{RowLayout, RowState, Rows};
 use super::survey::FamilySoftness;
 use super::workers::{WorkerScratch, Workers};
 use crate::constraints::bends::families::BendFamily;
@@ -36,17 +29,11 @@ use crate::constraints::families::{Family, Sheet};
 use crate::constraints::fields::Pass;
 use crate::constraints::parameters::ConstraintParameters;
 use crate::kernels::Kernels;
-use crate::kernels::huge_pages::refill;
 use crate::kernels::lanes::axes;
 use crate::state::particles::Particle;
 use crate::step::schedule::{Schedule, ScheduledStage};
 use crate::step::substep::SubstepInputs;
 use crate::step::wind::WindStep;
-
-/// Memory in whole cache lines.
-#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C, align(64))]
-struct CacheLine([f32; LINE_LENGTH]);
 
 /// The families of a sheet, in the order of projection.
 #[derive(Debug, Clone, Default)]
@@ -59,40 +46,21 @@ pub(crate) struct SheetFamilies {
 #[derive(Debug, Clone)]
 pub(crate) struct Patch {
     pub(crate) sheet: Sheet,
-    layout: RowLayout,
-    lines: Vec<CacheLine>,
+    pub(crate) rows: Rows,
+    layout: SheetLayout,
     column_order: ColumnOrder,
     schedule: Schedule,
     forces: SheetForces,
 }
 
-/// The state fields of a row.
-struct RowState<'a> {
-    x: [&'a mut [f32]; 3],
-    w: &'a mut [f32],
-    d: [&'a mut [f32]; 3],
-}
-
-impl<'a> RowState<'a> {
-    fn new(row: &'a mut [f32], stride: usize) -> Self {
-        let mut rest = row;
-        let mut next = || {
-            let (field, others) = std::mem::take(&mut rest).split_at_mut(stride);
-            rest = others;
-            field
-        };
-        let x = [next(), next(), next()];
-        Self { x, w: next(), d: [next(), next(), next()] }
-    }
-}
-
 impl Patch {
     /// Makes an empty patch with these families, in the order of projection.
     pub(crate) fn new(sheet: Sheet, families: &SheetFamilies) -> Self {
+        let layout = SheetLayout::new(&families.constraints, &families.bends);
         Self {
             sheet,
-            layout: RowLayout::new(&sheet, &families.constraints, &families.bends),
-            lines: Vec::new(),
+            rows: Rows::new(layout.rows(&sheet)),
+            layout,
             column_order: ColumnOrder::default(),
             schedule: Schedule::default(),
             forces: SheetForces::default(),
@@ -104,7 +72,7 @@ impl Patch {
         for block in &mut self.layout.families {
             block.softness = softness[block.family as usize].unwrap_or_default();
         }
-        self.layout.set_fields(layout.of_sheet());
+        self.layout.set_fields(&mut self.rows.layout, layout.of_sheet());
         let families = &self.layout.families;
         let groups = 0..2 * families.len();
         let reaches = groups.map(|group| families[group / 2].family.reach());
@@ -115,12 +83,13 @@ impl Patch {
     /// Allocates the fields of the layout. Every constraint and bend is inactive afterwards, and no
     /// particle has a tether.
     pub(crate) fn allocate(&mut self) {
-        let RowLayout { rows, row_length, stride, constraints_at, family_length, .. } = self.layout;
-        refill(&mut self.lines, rows * row_length / LINE_LENGTH, CacheLine([0.0; LINE_LENGTH]));
-        self.column_order = ColumnOrder::new(self.layout.fields.constraints);
+        self.rows.allocate();
+        let RowLayout { rows, length, stride, fields, .. } = self.rows.layout;
+        self.column_order = ColumnOrder::new(fields.constraints);
+        let constraints_at = self.rows.layout.constraints_at * stride;
         for row in 0..rows {
             for family in 0..self.layout.families.len() {
-                let first = row * row_length + constraints_at * stride + family * family_length;
+                let first = row * length + constraints_at + family * self.layout.family_length;
                 for index in first..first + stride {
                     self.writer().set(index, &ConstraintParameters::INACTIVE);
                 }
@@ -129,57 +98,44 @@ impl Patch {
         for row in 0..rows {
             for family in 0..self.layout.bends.families.len() {
                 let BendLayout { at, family_length, .. } = self.layout.bends;
-                let first = row * row_length + at + family * family_length;
+                let first = row * length + at + family * family_length;
                 for index in first..first + stride {
                     self.set_bend(index, f32::INFINITY);
-                }
-            }
-        }
-        for slot in 0..self.layout.fields.scene.tethers {
-            for row in 0..rows {
-                for column in 0..stride {
-                    let index = self.particle_index([row, column]);
-                    self.set_tether_length(index, slot, f32::INFINITY);
                 }
             }
         }
     }
 
     /// Index of a constraint for [`Self::writer`].
-    pub(crate) fn constraint_index(&self, family: Family, place: [usize; 2]) -> usize {
-        self.layout.constraint_index(family, place)
+    pub(crate) fn constraint_index(&self, family: Family, [row, column]: [usize; 2]) -> usize {
+        let rows = &self.rows.layout;
+        row * rows.length + self.layout.constraint_index(rows, family, column)
     }
 
     /// Writer for the constraints, by [`Self::constraint_index`].
     pub(crate) fn writer(&mut self) -> ColumnWriter<'_> {
-        let numbers: &mut [f32] = bytemuck::cast_slice_mut(&mut self.lines);
-        ColumnWriter::new(numbers, self.layout.stride, self.column_order)
+        let (layout, numbers) = self.rows.split_mut();
+        ColumnWriter::new(numbers, layout.stride, self.column_order)
     }
 
     /// Index of a bend for [`Self::set_bend`].
     pub(crate) fn bend_index(&self, family: BendFamily, place: [usize; 2]) -> usize {
-        self.layout.bend_index(family, place)
+        let rows = &self.rows.layout;
+        place[0] * rows.length + self.layout.bend_index(rows, family, place)
     }
 
     /// Sets the scaled compliance of a bend; infinite for one without effect.
     pub(crate) fn set_bend(&mut self, index: usize, scaled_compliance: f32) {
-        let numbers: &mut [f32] = bytemuck::cast_slice_mut(&mut self.lines);
-        numbers[index] = scaled_compliance;
-    }
-
-    fn row(&mut self, row: usize) -> RowState<'_> {
-        let RowLayout { row_length, stride, .. } = self.layout;
-        let numbers: &mut [f32] = bytemuck::cast_slice_mut(&mut self.lines);
-        RowState::new(&mut numbers[row * row_length..][..row_length], stride)
+        self.rows.numbers_mut()[index] = scaled_compliance;
     }
 
     /// Copies the state at the start of a step, with velocities in the place of displacements.
     pub(crate) fn unpack(&mut self, states: &[Particle]) {
         let first = self.sheet.first as usize;
-        let columns = self.layout.columns;
-        for row in 0..self.layout.rows {
+        let columns = self.rows.layout.columns;
+        for row in 0..self.rows.layout.rows {
             let states = &states[first + row * columns..][..columns];
-            let RowState { x, w, d } = self.row(row);
+            let RowState { x, w, d } = self.rows.state_mut(row);
             for axis in 0..3 {
                 for (number, state) in x[axis].iter_mut().zip(states) {
                     *number = state.position[axis];
@@ -225,12 +181,12 @@ impl Patch {
         (stages, pass): (&[ScheduledStage], Pass),
         inputs: &SubstepInputs<'_>,
     ) -> bool {
-        let (layout, forces) = (&self.layout, &mut self.forces);
+        let (sheet, forces) = (&self.layout, &mut self.forces);
         let is_measured = forces.is_measured();
-        let numbers: &mut [f32] = bytemuck::cast_slice_mut(&mut self.lines);
+        let (layout, numbers) = self.rows.split_mut();
         let kernels = workers.kernels;
         let reach = stages.iter().map(|stage| stage.reach).sum();
-        let count = layout.band_count(workers.count(), reach);
+        let count = band_count(layout, workers.count(), reach);
         let run = |band: Band<'_>, span, scratch: &mut WorkerScratch| {
             let sweep = PassSweep { stages, pass, inputs, scratch };
             if is_measured {
@@ -240,7 +196,7 @@ impl Patch {
             }
         };
         if count == 1 {
-            let band = Band { numbers, first: 0, layout, forces: forces.all(layout) };
+            let band = Band { numbers, first: 0, layout, sheet, forces: forces.all(sheet) };
             let span = Span::new(0..layout.rows, layout.rows);
             return run(band, span, workers.own_scratch());
         }
@@ -259,7 +215,7 @@ impl Patch {
                 }
             };
             let whole =
-                Band { numbers: &mut *numbers, first: 0, layout, forces: forces.all(layout) };
+                Band { numbers: &mut *numbers, first: 0, layout, sheet, forces: forces.all(sheet) };
             let parts = BandPart::split(whole, spans);
             workers.for_each(parts, work, |part| is_marked |= part.is_marked);
         };
@@ -272,10 +228,10 @@ impl Patch {
     pub(crate) fn pack(&mut self, states: &mut [Particle], h: f32) -> u64 {
         let mut frozen_count = 0;
         let first = self.sheet.first as usize;
-        let columns = self.layout.columns;
-        for row in 0..self.layout.rows {
+        let columns = self.rows.layout.columns;
+        for row in 0..self.rows.layout.rows {
             let states = &mut states[first + row * columns..][..columns];
-            let RowState { x, d, .. } = self.row(row);
+            let RowState { x, d, .. } = self.rows.state_mut(row);
             for (column, state) in states.iter_mut().enumerate() {
                 let vector = |fields: &[&mut [f32]; 3]| axes(|axis| fields[axis][column]);
                 let motion = PublishedMotion { position: vector(&x), displacement: vector(&d), h };
@@ -285,72 +241,10 @@ impl Patch {
         frozen_count
     }
 
-    /// Index, among all numbers, of the x position of a particle.
-    pub(crate) fn particle_index(&self, [row, column]: [usize; 2]) -> usize {
-        row * self.layout.row_length + column
-    }
-
-    /// Vector of a particle in fields `field`, `field` + 1 and `field` + 2.
-    #[inline(always)]
-    fn vector(&self, index: usize, field: usize) -> [f32; 3] {
-        let numbers: &[f32] = bytemuck::cast_slice(&self.lines);
-        axes(|axis| numbers[index + (field + axis) * self.layout.stride])
-    }
-
-    fn set_vector(&mut self, index: usize, field: usize, vector: [f32; 3]) {
-        let stride = self.layout.stride;
-        let numbers: &mut [f32] = bytemuck::cast_slice_mut(&mut self.lines);
-        for (axis, value) in vector.into_iter().enumerate() {
-            numbers[index + (field + axis) * stride] = value;
-        }
-    }
-
-    #[inline(always)]
-    pub(crate) fn position(&self, index: usize) -> [f32; 3] {
-        self.vector(index, 0)
-    }
-
-    #[inline(always)]
-    pub(crate) fn inverse_mass(&self, index: usize) -> f32 {
-        let numbers: &[f32] = bytemuck::cast_slice(&self.lines);
-        numbers[index + 3 * self.layout.stride]
-    }
-
-    #[inline(always)]
-    pub(crate) fn displacement(&self, index: usize) -> [f32; 3] {
-        self.vector(index, 4)
-    }
-
-    /// Displacement before any constraint or contact, in a scene with colliders.
-    pub(crate) fn predicted(&self, index: usize) -> [f32; 3] {
-        self.vector(index, STATE_FIELDS)
-    }
-
-    pub(crate) fn set_position(&mut self, index: usize, position: [f32; 3]) {
-        self.set_vector(index, 0, position);
-    }
-
-    pub(crate) fn set_displacement(&mut self, index: usize, displacement: [f32; 3]) {
-        self.set_vector(index, 4, displacement);
-    }
-
     /// Computes the velocities that the wind adds in the running substep.
     pub(crate) fn blow(&mut self, kernels: Kernels, wind: &WindStep) {
-        let numbers: &mut [f32] = bytemuck::cast_slice_mut(&mut self.lines);
-        kernels.run(SheetWindWork { numbers, layout: &self.layout, wind });
-    }
-
-    /// Sets the position of a tether's root at the end of the substep.
-    pub(crate) fn set_root(&mut self, index: usize, slot: usize, root: [f32; 3]) {
-        self.set_vector(index, self.layout.root_at(slot), root);
-    }
-
-    /// Sets the length of a tether; infinite for no tether.
-    pub(crate) fn set_tether_length(&mut self, index: usize, slot: usize, length: f32) {
-        let at = index + (self.layout.root_at(slot) + 3) * self.layout.stride;
-        let stride = self.layout.stride;
-        let numbers: &mut [f32] = bytemuck::cast_slice_mut(&mut self.lines);
-        (numbers[at], numbers[at + stride]) = (length, length * length);
+        let (layout, numbers) = self.rows.split_mut();
+        kernels.run(SheetWindWork { numbers, layout, wind });
     }
 }
 

@@ -3,14 +3,13 @@
 use super::paths::{GraphWork, NO_TILE, Paths, Progress};
 use super::{Location, ParticleStore};
 use crate::kernels::lanes::PackedParticle;
-use crate::store::patch::Patch;
 
 impl ParticleStore {
     /// Replaces the paths with those that the particles are about to take.
     pub(crate) fn save_paths(&self, paths: &mut Paths) {
         paths.sheets.resize_with(self.patches.len(), Vec::new);
         for (patch, saved) in self.patches.iter().zip(&mut paths.sheets) {
-            patch.save_paths(saved);
+            patch.rows.save_paths(saved);
         }
         paths.graph.clear();
         paths.graph.extend_from_slice(self.graph.packed_particles());
@@ -30,7 +29,7 @@ impl ParticleStore {
                 paths.graph[index] = PackedParticle([x, y, z, 0.0, dx, dy, dz, 0.0]);
             }
             Some(sheet) => {
-                self.patches[sheet].set_saved_path(&mut paths.sheets[sheet], index, path);
+                self.patches[sheet].rows.set_saved_path(&mut paths.sheets[sheet], index, path);
             }
         }
     }
@@ -38,7 +37,7 @@ impl ParticleStore {
     /// Makes room for the paths of all particles, none of which has a tile.
     pub(crate) fn prepare_paths(&self, paths: &mut Paths) {
         self.save_paths(paths);
-        paths.tiles_of_sheets = self.patches.iter().map(Patch::no_tiles).collect();
+        paths.tiles_of_sheets = self.patches.iter().map(|patch| patch.rows.no_tiles()).collect();
         paths.tiles_of_graph = vec![NO_TILE; paths.graph.len()];
     }
 
@@ -48,7 +47,7 @@ impl ParticleStore {
         match location.sheet() {
             None => paths.tiles_of_graph[index] = tile,
             Some(sheet) => {
-                self.patches[sheet].set_tile(&mut paths.tiles_of_sheets[sheet], index, tile);
+                self.patches[sheet].rows.set_tile(&mut paths.tiles_of_sheets[sheet], index, tile);
             }
         }
     }
@@ -61,7 +60,7 @@ impl ParticleStore {
         kernels.run(GraphWork { now, saved, tiles, progress, has_stray: &mut *has_stray });
         let sheets = paths.sheets.iter().zip(&paths.tiles_of_sheets);
         for (patch, (saved, tiles)) in self.patches.iter().zip(sheets) {
-            kernels.run(patch.stray_work(saved, tiles, progress, &mut *has_stray));
+            kernels.run(patch.rows.stray_work(saved, tiles, progress, &mut *has_stray));
         }
     }
 }

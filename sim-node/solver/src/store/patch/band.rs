@@ -8,9 +8,7 @@
 
 use super::band_forces::BandForces;
 use super::bends::project_bends;
-use super::ends::{ColumnUnit, Ends, project_across, project_down};
-use super::row::SheetRow;
-use super::row_layout::{FamilyBlock, LINE_LENGTH, RowLayout, STATE_FIELDS};
+use super::sheet_layout::{FamilyBlock, SheetLayout};
 use super::span::Span;
 use crate::constraints::bends::projection::BendPass;
 use crate::constraints::columns::{ConstraintColumns, FullPass};
@@ -24,6 +22,9 @@ use crate::step::schedule::ScheduledStage;
 use crate::step::stage::Stage;
 use crate::step::substep::SubstepInputs;
 use crate::store::pulls::Numbers;
+use crate::store::rows::ends::{ColumnUnit, Ends, project_across, project_down};
+use crate::store::rows::particles::RowParticles;
+use crate::store::rows::{LINE_LENGTH, RowLayout, STATE_FIELDS};
 use crate::store::workers::WorkerScratch;
 
 /// Largest number of stages in a pass: two halves of six families, projected and limited, ten groups of
@@ -36,6 +37,7 @@ pub(crate) struct Band<'a> {
     /// Index of the first row.
     pub(crate) first: usize,
     pub(crate) layout: &'a RowLayout,
+    pub(crate) sheet: &'a SheetLayout,
     pub(crate) forces: BandForces<'a>,
 }
 
@@ -68,11 +70,11 @@ impl<const IS_MEASURED: bool> LaneWork for SweepWork<'_, '_, '_, IS_MEASURED> {
 impl<'a> Band<'a> {
     /// Splits before a row.
     pub(crate) fn split_at(self, row: usize) -> (Band<'a>, Band<'a>) {
-        let Self { numbers, first, layout, forces } = self;
-        let (numbers, others) = numbers.split_at_mut((row - first) * layout.row_length);
+        let Self { numbers, first, layout, sheet, forces } = self;
+        let (numbers, others) = numbers.split_at_mut((row - first) * layout.length);
         let (forces, other_forces) = forces.split_at(row);
-        let other = Band { numbers: others, first: row, layout, forces: other_forces };
-        (Band { numbers, first, layout, forces }, other)
+        let other = Band { numbers: others, first: row, layout, sheet, forces: other_forces };
+        (Band { numbers, first, layout, sheet, forces }, other)
     }
 }
 
@@ -129,7 +131,7 @@ impl Band<'_> {
                 return is_marked;
             }
             Stage::Bend => {
-                let group = 2 * self.layout.families.len() + scheduled.group;
+                let group = 2 * self.sheet.families.len() + scheduled.group;
                 let has_pulls = IS_MEASURED && self.forces.has_pulls(row, group);
                 if has_pulls {
                     self.note_pulls(row, group);
@@ -142,12 +144,12 @@ impl Band<'_> {
             }
             _ => {}
         }
-        let (layout, length) = (self.layout, self.layout.row_length);
+        let (layout, length) = (self.layout, self.layout.length);
         let numbers = &mut self.numbers[(row - self.first) * length..][..length];
         let is_measured = IS_MEASURED && matches!(scheduled.stage, Stage::Tether | Stage::Contact);
         let (reactions, tether_pulls): (&mut [_], &mut [_]) =
             if is_measured { self.forces.of_row(row) } else { (&mut [], &mut []) };
-        let mut row = SheetRow::new(numbers, layout, row, tether_pulls);
+        let mut row = RowParticles::new(numbers, layout, row, tether_pulls);
         let contacts = &mut sweep.scratch.contacts;
         run_stage::<W>(scheduled.stage, &mut row, sweep.inputs, contacts, reactions);
         false
@@ -158,8 +160,8 @@ impl Band<'_> {
     #[inline(never)]
     fn note_pulls(&mut self, row: usize, group: usize) {
         let projection = self.forces.projection(row, group);
-        let RowLayout { row_length, stride, .. } = *self.layout;
-        let numbers = Numbers { part: self.numbers, first: self.first * row_length, stride };
+        let RowLayout { length, stride, .. } = *self.layout;
+        let numbers = Numbers { part: self.numbers, first: self.first * length, stride };
         self.forces.pulls.note(projection, numbers);
     }
 
@@ -167,8 +169,8 @@ impl Band<'_> {
     #[inline(never)]
     fn add_pulls(&mut self, row: usize, group: usize) {
         let projection = self.forces.projection(row, group);
-        let RowLayout { row_length, stride, .. } = *self.layout;
-        let numbers = Numbers { part: self.numbers, first: self.first * row_length, stride };
+        let RowLayout { length, stride, .. } = *self.layout;
+        let numbers = Numbers { part: self.numbers, first: self.first * length, stride };
         self.forces.pulls.add_changes(projection, numbers);
     }
 
@@ -180,11 +182,17 @@ impl Band<'_> {
         row: usize,
         sweep: &mut PassSweep<'_, '_>,
     ) {
-        let group = self.layout.bends.groups[scheduled.group];
+        let group = self.sheet.bends.groups[scheduled.group];
         if group.begins_in(row) {
-            let rows = &mut self.numbers[(row - self.first) * self.layout.row_length..];
+            let rows = &mut self.numbers[(row - self.first) * self.layout.length..];
             let pass = BendPass::new(sweep.pass, sweep.inputs.relaxation);
-            project_bends::<W>(rows, self.layout, group, pass, &mut sweep.scratch.bends);
+            project_bends::<W>(
+                rows,
+                (self.layout, self.sheet),
+                group,
+                pass,
+                &mut sweep.scratch.bends,
+            );
         }
     }
 
@@ -196,9 +204,9 @@ impl Band<'_> {
         row: usize,
         sweep: &mut PassSweep<'_, '_>,
     ) -> bool {
-        let (layout, row_length) = (self.layout, self.layout.row_length);
+        let (layout, row_length) = (self.layout, self.layout.length);
         let (block_index, half) = (scheduled.group / 2, scheduled.group % 2);
-        let FamilyBlock { family, softness, is_rigid } = layout.families[block_index];
+        let FamilyBlock { family, softness, is_rigid } = self.sheet.families[block_index];
         let (stride, reach) = (layout.stride, family.reach());
         if reach > 0 && family.half(row, 0) != half {
             return false;
@@ -206,7 +214,7 @@ impl Band<'_> {
         let (upper, below) =
             self.numbers[(row - self.first) * row_length..].split_at_mut(row_length);
         let (state, rest) = upper.split_at_mut(STATE_FIELDS * stride);
-        let length = layout.family_length;
+        let length = self.sheet.family_length;
         let family_at = (layout.constraints_at - STATE_FIELDS) * stride + block_index * length;
         let memory = &mut rest[family_at..][..length];
         let columns = ConstraintColumns::new(memory, stride, layout.fields.constraints);

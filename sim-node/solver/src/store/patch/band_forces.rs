@@ -1,12 +1,10 @@
 //! Forces of the particles of some rows on colliders and fixed particles.
 
-use super::row_layout::RowLayout;
+use super::sheet_layout::SheetLayout;
 use crate::contacts::contact::reaction::BlockReaction;
-use crate::kernels::lanes::Lanes8;
 use crate::store::pulls::{Pulls, PullsPart};
-
-/// The displacements that tethers have taken from eight particles, axis by axis.
-pub(crate) type TetherPulls = [Lanes8; 3];
+use crate::store::rows::RowLayout;
+use crate::store::rows::particles::TetherPulls;
 
 /// The forces of a sheet. Empty while nobody asks for them.
 #[derive(Debug, Clone, Default)]
@@ -28,8 +26,13 @@ pub(crate) struct SheetForces {
 
 impl SheetForces {
     /// Makes room for a sheet, without tethers.
-    pub(crate) fn new(pulls: Pulls, layout: &RowLayout, collider_count: usize) -> Self {
-        let count = layout.pull_groups();
+    pub(crate) fn new(
+        pulls: Pulls,
+        layout: &RowLayout,
+        pull_groups: usize,
+        collider_count: usize,
+    ) -> Self {
+        let count = pull_groups;
         let mask =
             |row| (0..count).fold(0, |mask, n| mask | u32::from(pulls.has(row * count + n)) << n);
         let groups = layout.rows * layout.fields.scene.tethers * layout.columns.div_ceil(8);
@@ -50,7 +53,7 @@ impl SheetForces {
     }
 
     /// All rows.
-    pub(crate) fn all(&mut self, layout: &RowLayout) -> BandForces<'_> {
+    pub(crate) fn all(&mut self, layout: &SheetLayout) -> BandForces<'_> {
         let Self {
             pulls, pull_masks, reactions, reaction_count, tether_pulls, tether_length, ..
         } = self;

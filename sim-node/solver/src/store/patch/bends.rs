@@ -1,8 +1,7 @@
 //! The projection of the bends of a sheet.
 
 use super::bend_layout::BendGroup;
-use super::ends::{ColumnUnit, Ends, pairs, pairs_mut, unzip, zip};
-use super::row_layout::{RowLayout, STATE_FIELDS};
+use super::sheet_layout::SheetLayout;
 use crate::constraints::bends::block::{BEND_BLOCK_LENGTH, BendBlock};
 use crate::constraints::bends::families::BendFamily;
 use crate::constraints::bends::projection::{
@@ -11,18 +10,20 @@ use crate::constraints::bends::projection::{
 use crate::constraints::bends::{SECOND_DIFFERENCE, TWIST};
 use crate::constraints::projection::LaneIndex;
 use crate::kernels::lanes::{Lanes8, Wide, axes, lane_groups, lane_groups_mut, map_axes};
+use crate::store::rows::ends::{ColumnUnit, Ends, pairs, pairs_mut, unzip, zip};
+use crate::store::rows::{RowLayout, STATE_FIELDS};
 
 /// Projects the bends of a group that begin in the first of some rows.
 #[inline(always)]
 pub(crate) fn project_bends<W: Wide>(
     rows: &mut [f32],
-    layout: &RowLayout,
+    (layout, sheet): (&RowLayout, &SheetLayout),
     group: BendGroup,
     pass: BendPass,
     block: &mut BendBlock,
 ) {
-    let RowLayout { stride, row_length, columns, ref bends, .. } = *layout;
-    let (row, below) = rows.split_at_mut(row_length);
+    let (RowLayout { stride, length, columns, .. }, bends) = (*layout, &sheet.bends);
+    let (row, below) = rows.split_at_mut(length);
     let (state, rest) = row.split_at_mut(STATE_FIELDS * stride);
     let at = bends.at - STATE_FIELDS * stride + group.family_index * bends.family_length;
     let lanes = group.lane_groups(columns, stride);
@@ -37,7 +38,7 @@ pub(crate) fn project_bends<W: Wide>(
     };
     match group.family {
         BendFamily::Down => {
-            let (second, third) = below.split_at_mut(row_length);
+            let (second, third) = below.split_at_mut(length);
             let ends = |row| Ends::new(row, stride, 0, count);
             bend_down::<W>([ends(state), ends(second), ends(third)], &mut projection);
         }

@@ -3,18 +3,19 @@
 use glam::DVec3;
 
 use super::Patch;
-use super::band_forces::{SheetForces, TetherPulls};
-use super::row_layout::RowLayout;
+use super::band_forces::SheetForces;
 use crate::constraints::families::Family;
 use crate::kernels::lanes::{Lanes8, axes, lane_groups};
 use crate::store::pulls::{Pull, Pulls};
+use crate::store::rows::RowLayout;
+use crate::store::rows::particles::TetherPulls;
 
 impl Patch {
     /// Measures these pulls, and the reactions of colliders, in each further step.
     pub(crate) fn measure_forces(&mut self, pulls: Vec<Pull>, collider_count: usize) {
-        let layout = &self.layout;
-        let pulls = Pulls::new(pulls, layout.rows * layout.pull_groups());
-        self.forces = SheetForces::new(pulls, layout, collider_count);
+        let (layout, pull_groups) = (&self.rows.layout, self.layout.pull_groups());
+        let pulls = Pulls::new(pulls, layout.rows * pull_groups);
+        self.forces = SheetForces::new(pulls, layout, pull_groups, collider_count);
     }
 
     pub(crate) fn forget_forces(&mut self) {
@@ -28,17 +29,18 @@ impl Patch {
     /// Sets the root of a tether.
     pub(crate) fn set_tether_receiver(&mut self, place: [usize; 2], slot: usize, receiver: u32) {
         let [row, column] = place;
-        let RowLayout { columns, ref fields, .. } = self.layout;
+        let RowLayout { columns, ref fields, .. } = self.rows.layout;
         let group = (row * fields.scene.tethers + slot) * columns.div_ceil(8) + column / 8;
         self.forces.tether_receivers[group][column % 8] = Some(receiver);
     }
 
     /// Moves the impulses of a step, times the length of a substep, to those of the fixed particles.
     pub(crate) fn take_pulls(&mut self, impulses: &mut [DVec3]) {
-        let Self { layout, lines, forces, .. } = self;
+        let Self { rows, forces, .. } = self;
+        let layout = &rows.layout;
         forces.pulls.take(impulses);
         let length = forces.tether_length;
-        let rows = bytemuck::cast_slice::<_, f32>(lines).chunks_exact(layout.row_length);
+        let rows = rows.numbers().chunks_exact(layout.length);
         let count = layout.columns.div_ceil(8);
         for group in 0..length {
             // Tethers of a column often have one root.
@@ -83,7 +85,7 @@ impl Patch {
 
     /// Where the x displacement of a particle is among the numbers of the sheet.
     pub(crate) fn displacement_place(&self, place: [usize; 2]) -> usize {
-        self.particle_index(place) + 4 * self.layout.stride
+        self.rows.particle_index(place) + 4 * self.rows.layout.stride
     }
 }
 

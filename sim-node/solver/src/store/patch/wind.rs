@@ -4,10 +4,10 @@
 //! right. The wind on eight cells is computed at once. Then eight particles sum it, each over its six
 //! triangles in their order in the scene. At the border, triangles that are not there add 0.
 
-use super::row_layout::RowLayout;
 use crate::kernels::lanes::{LaneWork, Lanes8, Wide, axes, lane_groups, lane_groups_mut};
 use crate::kernels::vectors::sum;
 use crate::step::wind::{Corner, TriangleWind, WindStep};
+use crate::store::rows::RowLayout;
 
 /// Groups of eight columns in a strip, whose wind stays in a near cache.
 const STRIP_GROUPS: usize = 16;
@@ -90,11 +90,11 @@ impl SheetWindWork<'_> {
     /// Adds up the velocities that the particles of a row gain from the cells above and below.
     #[inline(always)]
     fn add_up<W: Wide>(&mut self, row: usize, strip: Strip, [above, below]: [&CellRow; 2]) {
-        let RowLayout { rows, row_length, stride, .. } = *self.layout;
+        let RowLayout { rows, length, stride, .. } = *self.layout;
         let last_column = self.last_column::<W>();
         let one_if = |is_there| W::splat(if is_there { 1.0 } else { 0.0 });
         let (is_above, is_below) = (one_if(row > 0), one_if(row + 1 < rows));
-        let numbers = &mut self.numbers[row * row_length..][..row_length];
+        let numbers = &mut self.numbers[row * length..][..length];
         let (state, others) = numbers.split_at_mut(self.layout.wind_at() * stride);
         let inverse_masses = lane_groups(state, 3 * stride + strip.first, strip.groups);
         let (x, others) = others.split_at_mut(stride);
@@ -132,8 +132,8 @@ impl SheetWindWork<'_> {
     /// The particles of a row from a column on, and their right neighbours, as corners.
     #[inline(always)]
     fn corners(&self, row: usize, from: usize, count: usize) -> [CornerGroups<'_>; 2] {
-        let RowLayout { row_length, stride, .. } = *self.layout;
-        let numbers = &self.numbers[row * row_length..][..row_length];
+        let RowLayout { length, stride, .. } = *self.layout;
+        let numbers = &self.numbers[row * length..][..length];
         let field = |index: usize, column| lane_groups(numbers, index * stride + column, count);
         let fields = |column| CornerGroups {
             position: axes(|axis| field(axis, column)),

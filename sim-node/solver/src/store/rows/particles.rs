@@ -2,8 +2,7 @@
 
 use glam::Vec3;
 
-use super::band_forces::TetherPulls;
-use super::row_layout::{RowLayout, TETHER_FIELDS};
+use super::layout::{RowLayout, TETHER_FIELDS};
 use crate::constraints::separation::RestLength;
 use crate::constraints::tether_pull::{Tethered, tether_excess};
 use crate::contacts::path::{LanePath, SubstepPath};
@@ -12,8 +11,11 @@ use crate::step::particle_block::ParticleBlock;
 use crate::step::prediction::Prediction;
 use crate::store::layout::SceneFields;
 
+/// The displacements that tethers have taken from eight particles, axis by axis.
+pub(crate) type TetherPulls = [Lanes8; 3];
+
 /// The particles of a row, with the fields that only some scenes have.
-pub(crate) struct SheetRow<'a> {
+pub(crate) struct RowParticles<'a> {
     x: [&'a mut [Lanes8]; 3],
     w: &'a [Lanes8],
     d: [&'a mut [Lanes8]; 3],
@@ -30,7 +32,7 @@ pub(crate) struct SheetRow<'a> {
     first: usize,
 }
 
-impl<'a> SheetRow<'a> {
+impl<'a> RowParticles<'a> {
     #[inline(always)]
     pub(crate) fn new(
         numbers: &'a mut [f32],
@@ -72,7 +74,7 @@ fn next_vector<'a>(rest: &mut &'a mut [f32], stride: usize, count: usize) -> [&'
     [x, y, next_field(rest, stride, count)]
 }
 
-impl SheetRow<'_> {
+impl RowParticles<'_> {
     #[inline(always)]
     fn predicted_fields(&self) -> &[&mut [Lanes8]; 3] {
         let Some(predicted) = &self.predicted else {
@@ -115,7 +117,7 @@ fn add_pulls<W: Wide>(sums: &mut TetherPulls, excess: [W; 3]) {
     }
 }
 
-impl ParticleBlock for SheetRow<'_> {
+impl ParticleBlock for RowParticles<'_> {
     fn group_count(&self) -> usize {
         self.w.len()
     }

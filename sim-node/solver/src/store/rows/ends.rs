@@ -1,6 +1,6 @@
 //! The projection of constraints between two rows, and within one.
 
-use super::row_layout::STATE_FIELDS;
+use super::layout::STATE_FIELDS;
 use crate::constraints::projection::{LaneIndex, Projection};
 use crate::constraints::projection_block::{BLOCK_LENGTH, ProjectionBlock};
 use crate::constraints::separation::Separation;

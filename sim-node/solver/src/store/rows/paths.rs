@@ -1,6 +1,6 @@
-//! The paths of the particles of a sheet.
+//! The paths of the particles of rows.
 
-use super::Patch;
+use super::Rows;
 use crate::kernels::lanes::{LaneWork, Wide, axes, lane_groups};
 use crate::store::paths::{NO_TILE, Progress, mark_tiles};
 
@@ -9,13 +9,13 @@ const SAVED_FIELDS: usize = 6;
 /// First field of the displacement in a row.
 const DISPLACEMENT_AT: usize = 4;
 
-impl Patch {
+impl Rows {
     /// Replaces the saved paths with those that the particles are about to take.
     pub(crate) fn save_paths(&self, saved: &mut Vec<f32>) {
-        let (stride, row_length) = (self.layout.stride, self.layout.row_length);
-        let numbers: &[f32] = bytemuck::cast_slice(&self.lines);
+        let (stride, length) = (self.layout.stride, self.layout.length);
+        let numbers: &[f32] = self.numbers();
         saved.clear();
-        for row in numbers.chunks_exact(row_length) {
+        for row in numbers.chunks_exact(length) {
             saved.extend_from_slice(&row[..3 * stride]);
             saved.extend_from_slice(&row[DISPLACEMENT_AT * stride..][..3 * stride]);
         }
@@ -23,8 +23,8 @@ impl Patch {
 
     /// Replaces the saved path of a particle: position and displacement.
     pub(crate) fn set_saved_path(&self, saved: &mut [f32], index: usize, path: [[f32; 3]; 2]) {
-        let (stride, row_length) = (self.layout.stride, self.layout.row_length);
-        let first = index / row_length * SAVED_FIELDS * stride + index % row_length;
+        let (stride, length) = (self.layout.stride, self.layout.length);
+        let first = index / length * SAVED_FIELDS * stride + index % length;
         for (field, number) in path.into_iter().flatten().enumerate() {
             saved[first + field * stride] = number;
         }
@@ -37,8 +37,8 @@ impl Patch {
 
     /// Sets the tile of a particle.
     pub(crate) fn set_tile(&self, tiles: &mut [u32], index: usize, tile: u32) {
-        let (stride, row_length) = (self.layout.stride, self.layout.row_length);
-        tiles[index / row_length * stride + index % row_length] = tile;
+        let (stride, length) = (self.layout.stride, self.layout.length);
+        tiles[index / length * stride + index % length] = tile;
     }
 
     /// Compares the particles with saved paths. Marks the tiles of those that are beside theirs.
@@ -49,12 +49,12 @@ impl Patch {
         progress: Progress,
         has_stray: &'a mut [bool],
     ) -> impl LaneWork<Output = ()> + 'a {
-        StrayWork { patch: self, saved, tiles, progress, has_stray }
+        StrayWork { rows: self, saved, tiles, progress, has_stray }
     }
 }
 
 struct StrayWork<'a> {
-    patch: &'a Patch,
+    rows: &'a Rows,
     saved: &'a [f32],
     tiles: &'a [u32],
     progress: Progress,
@@ -66,10 +66,10 @@ impl LaneWork for StrayWork<'_> {
 
     #[inline(always)]
     fn run<W: Wide>(self) {
-        let layout = &self.patch.layout;
+        let layout = &self.rows.layout;
         let (stride, count) = (layout.stride, layout.columns.div_ceil(8));
-        let numbers: &[f32] = bytemuck::cast_slice(&self.patch.lines);
-        let rows = numbers.chunks_exact(layout.row_length);
+        let numbers: &[f32] = self.rows.numbers();
+        let rows = numbers.chunks_exact(layout.length);
         let saved = self.saved.chunks_exact(SAVED_FIELDS * stride);
         for ((row, saved), tiles) in rows.zip(saved).zip(self.tiles.chunks_exact(stride)) {
             let x = axes(|axis| lane_groups(row, axis * stride, count));
