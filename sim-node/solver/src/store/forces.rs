@@ -51,11 +51,11 @@ impl ParticleStore {
         }
         for TetherEnds { particle, slot, root } in tethers {
             let Some(receiver) = receivers.of_particles[root as usize] else { continue };
-            if let Some(found) = find_sheet(&self.sheets, particle) {
-                self.patches[found.sheet].set_tether_receiver(found.place, slot, receiver);
-            } else {
-                let index = self.location(particle).index();
-                self.graph.set_tether_receiver(index, slot, receiver);
+            let location = self.location(particle);
+            let index = location.index();
+            match location.sheet() {
+                None => self.graph.set_tether_receiver(index, slot, receiver),
+                Some(sheet) => self.patches[sheet].set_tether_receiver(index, slot, receiver),
             }
         }
     }
@@ -183,9 +183,10 @@ impl ParticleStore {
 
     /// Where the x displacement of a particle is among the numbers of the graph or its sheet.
     fn displacement_place(&self, particle: u32) -> usize {
-        match find_sheet(&self.sheets, particle) {
-            Some(found) => self.patches[found.sheet].displacement_place(found.place),
-            None => Graph::displacement_place(self.location(particle).index()),
+        let location = self.location(particle);
+        match location.sheet() {
+            None => Graph::displacement_place(location.index()),
+            Some(sheet) => self.patches[sheet].rows.displacement_place(location.index()),
         }
     }
 }

@@ -8,6 +8,7 @@ pub(crate) mod ends;
 mod layout;
 pub(crate) mod particles;
 mod paths;
+pub(crate) mod tether_forces;
 
 pub(crate) use layout::{LINE_LENGTH, RowLayout, STATE_FIELDS};
 
@@ -88,6 +89,11 @@ impl Rows {
     /// Index, among all numbers, of the x position of a particle.
     pub(crate) fn particle_index(&self, [row, column]: [usize; 2]) -> usize {
         row * self.layout.length + column
+    }
+
+    /// Where the x displacement of a particle is among all numbers.
+    pub(crate) fn displacement_place(&self, index: usize) -> usize {
+        index + 4 * self.layout.stride
     }
 
     /// Vector of a particle in fields `field`, `field` + 1 and `field` + 2.

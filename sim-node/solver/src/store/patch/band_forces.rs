@@ -5,6 +5,7 @@ use crate::contacts::contact::reaction::BlockReaction;
 use crate::store::pulls::{Pulls, PullsPart};
 use crate::store::rows::RowLayout;
 use crate::store::rows::particles::TetherPulls;
+use crate::store::rows::tether_forces::TetherForces;
 
 /// The forces of a sheet. Empty while nobody asks for them.
 #[derive(Debug, Clone, Default)]
@@ -16,12 +17,7 @@ pub(crate) struct SheetForces {
     pub(crate) reactions: Vec<BlockReaction>,
     /// Number of reactions of a row.
     reaction_count: usize,
-    /// By row, tether and eight columns: the displacements that tethers have taken in this step.
-    pub(crate) tether_pulls: Vec<TetherPulls>,
-    /// Number of tether pulls of a row.
-    pub(crate) tether_length: usize,
-    /// By row, tether and eight columns: index of the root among the fixed particles.
-    pub(crate) tether_receivers: Vec<[Option<u32>; 8]>,
+    pub(crate) tethers: TetherForces,
 }
 
 impl SheetForces {
@@ -35,15 +31,12 @@ impl SheetForces {
         let count = pull_groups;
         let mask =
             |row| (0..count).fold(0, |mask, n| mask | u32::from(pulls.has(row * count + n)) << n);
-        let groups = layout.rows * layout.fields.scene.tethers * layout.columns.div_ceil(8);
         Self {
             pull_masks: (0..layout.rows).map(mask).collect(),
             pulls,
             reactions: vec![BlockReaction::default(); layout.rows * collider_count],
             reaction_count: collider_count,
-            tether_pulls: vec![[[0.0; 8]; 3]; groups],
-            tether_length: groups / layout.rows,
-            tether_receivers: vec![[None; 8]; groups],
+            tethers: TetherForces::new(layout),
         }
     }
 
@@ -54,18 +47,16 @@ impl SheetForces {
 
     /// All rows.
     pub(crate) fn all(&mut self, layout: &SheetLayout) -> BandForces<'_> {
-        let Self {
-            pulls, pull_masks, reactions, reaction_count, tether_pulls, tether_length, ..
-        } = self;
+        let Self { pulls, pull_masks, reactions, reaction_count, tethers } = self;
         BandForces {
             first: 0,
             pull_masks,
             pull_groups: layout.pull_groups(),
             reaction_count: *reaction_count,
-            tether_length: *tether_length,
+            tether_length: tethers.length,
             pulls: pulls.whole(),
             reactions,
-            tether_pulls,
+            tether_pulls: &mut tethers.pulls,
         }
     }
 }
