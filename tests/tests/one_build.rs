@@ -21,6 +21,9 @@ const PACKAGES: [&str; 10] = [
     "integration-tests",
 ];
 
+/// The packages that `cargo demo --bodies` builds.
+const DEMO: [&str; 4] = ["sim-node", "recorder", "viewer-bridge", "integration-tests"];
+
 /// Third-party crates of a selection, each with its version and features. A crate that is used by
 /// build scripts as well appears twice if its features differ there.
 #[allow(clippy::disallowed_methods, reason = "Cargo alone resolves features")]
@@ -41,18 +44,22 @@ fn crates(selection: &[&str], edges: &str) -> BTreeSet<String> {
 
 #[test]
 fn every_selection_of_packages_enables_the_same_features() {
-    let everything =
-        ["normal,build", "normal,build,dev"].map(|edges| crates(&["--workspace"], edges));
-    let everything: BTreeSet<String> = everything.into_iter().flatten().collect();
-    let programs = PROGRAMS.map(|package| (package, "normal,build"));
-    let packages = PACKAGES.map(|package| (package, "normal,build,dev"));
-    for (package, edges) in programs.into_iter().chain(packages) {
-        let selected = crates(&["--package", package], edges);
-        let others: Vec<_> = selected.difference(&everything).collect();
-        assert!(
-            others.is_empty(),
-            "-p {package} ({edges}) enables other features than --workspace; \
-             add those of --workspace to .cargo/build-features/Cargo.toml: {others:#?}"
-        );
+    let selections = [
+        ("normal,build", PROGRAMS.map(|package| vec![package]).to_vec()),
+        ("normal,build,dev", PACKAGES.map(|package| vec![package]).to_vec()),
+        ("normal,build,dev", vec![DEMO.to_vec()]),
+    ];
+    for (edges, selections) in selections {
+        let everything = crates(&["--workspace"], edges);
+        for packages in selections {
+            let arguments = packages.iter().flat_map(|package| ["--package", *package]);
+            let selected = crates(&arguments.collect::<Vec<_>>(), edges);
+            let others: Vec<_> = selected.difference(&everything).collect();
+            assert!(
+                others.is_empty(),
+                "{packages:?} ({edges}) enable other features than --workspace; \
+                 add those of --workspace to .cargo/build-features/Cargo.toml: {others:#?}"
+            );
+        }
     }
 }
