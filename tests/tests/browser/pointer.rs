@@ -274,10 +274,9 @@ fn a_finger_grabs_a_particle_and_a_long_press_pins_one() {
     // The curtain swings. In a pause the press falls on the particle that the page shows there.
     let from = camera.project(rig.pause().particles[TARGET].position);
     let to = [from[0] + 40.0, from[1] - 30.0];
-    rig.tab.finger("touchStart", Some(from));
+    rig.tab.drag_finger(from, to);
     rig.tab.key(' ');
     rig.wait_for_state("the grab", |state| is_grabbed(&state.particles[TARGET]));
-    rig.tab.finger("touchMove", Some(to));
     rig.wait_for_state("the particle under the finger", |state| {
         distance(camera.project(state.particles[TARGET].position), to) < 1.0
     });

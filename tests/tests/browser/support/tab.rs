@@ -281,6 +281,15 @@ impl Tab {
         self.call("Input.dispatchTouchEvent", json!({ "type": kind, "touchPoints": points }));
     }
 
+    /// Presses a finger and moves it at once: on a busy machine, the answer to the press could take as long as a
+    /// long press.
+    pub(crate) fn drag_finger(&self, from: [f64; 2], to: [f64; 2]) {
+        let touch = |kind: &str, [x, y]: [f64; 2]| json!({ "type": kind, "touchPoints": [{ "x": x, "y": y }] });
+        let method = "Input.dispatchTouchEvent";
+        self.browser.post(&self.session, method, touch("touchStart", from));
+        self.call(method, touch("touchMove", to));
+    }
+
     /// Presses and releases the key of a character.
     pub(crate) fn key(&self, key: char) {
         let key = key.to_string();
