@@ -4,6 +4,7 @@
 
 mod bends;
 mod configure;
+mod crowd;
 mod forces;
 mod graph;
 mod layout;
@@ -17,18 +18,20 @@ mod survey;
 mod workers;
 
 use bends::StoredBends;
+use crowd::{Crowd, find_figures};
 use graph::Graph;
 use layout::Layout;
 pub(crate) use layout::{Configured, Location, SceneFields, TetherPlace};
-use patch::{Patch, SheetFamilies};
+use patch::Patch;
+use patch::sheets::{Found, families_of, find_sheet, loose_particles, pure_sheets};
 pub(crate) use paths::{Paths, Progress};
 pub(crate) use pulls::{Receivers, TetherEnds};
+use rows::Rows;
 use survey::Survey;
 use workers::Workers;
 
-use crate::constraints::bends::families::BendFamily;
 use crate::constraints::column_writer::ColumnWriter;
-use crate::constraints::families::{Family, Sheet};
+use crate::constraints::families::Sheet;
 use crate::constraints::fields::Pass;
 use crate::constraints::order::ProjectionOrders;
 use crate::constraints::parameters::ConstraintParameters;
@@ -50,6 +53,7 @@ pub(crate) struct ParticleStore {
     patches: Vec<Patch>,
     /// Sheets of the patches, ascending.
     sheets: Vec<Sheet>,
+    crowds: Vec<Crowd>,
     layout: Layout,
     is_allocated: bool,
     /// Properties of the constraints with the current parameters.
@@ -70,7 +74,13 @@ impl ParticleStore {
         let sheets = if is_structured { pure_sheets(model) } else { Vec::new() };
         let mut locations = vec![Location::default(); model.constraints.len()];
         let mut bends = StoredBends::new(model);
-        let loose = loose_particles(model, &sheets);
+        let mut loose = loose_particles(model, &sheets);
+        let mut crowds = Vec::new();
+        if is_structured {
+            let figures = find_figures(model, &orders.constraints, &loose);
+            loose.retain(|particle| figures.iter().all(|one| one.find(*particle).is_none()));
+            crowds.extend(figures.into_iter().map(Crowd::new));
+        }
         let mut graph = Graph::new(model, &orders.constraints, loose, &mut locations);
         graph.set_bends(model, &orders.bends, &mut bends.locations);
         let families = families_of(model, &sheets);
@@ -81,6 +91,7 @@ impl ParticleStore {
             graph,
             patches: patches.collect(),
             sheets,
+            crowds,
             layout: Layout::default(),
             is_allocated: false,
             survey: Survey::default(),
@@ -95,10 +106,41 @@ impl ParticleStore {
     }
 
     fn writer(&mut self, location: Location) -> ColumnWriter<'_> {
-        match location.sheet() {
+        let sheet_count = self.patches.len();
+        match location.rows() {
             None => self.graph.writer(),
-            Some(sheet) => self.patches[sheet].writer(),
+            Some(rows) if rows < sheet_count => self.patches[rows].writer(),
+            Some(rows) => self.crowds[rows - sheet_count].writer(),
         }
+    }
+
+    /// The rows of a location; none in the graph.
+    #[inline(always)]
+    fn rows(&self, location: Location) -> Option<&Rows> {
+        let rows = location.rows()?;
+        Some(match self.patches.get(rows) {
+            Some(patch) => &patch.rows,
+            None => &self.crowds[rows - self.patches.len()].rows,
+        })
+    }
+
+    fn rows_mut(&mut self, location: Location) -> Option<&mut Rows> {
+        let (rows, sheet_count) = (location.rows()?, self.patches.len());
+        Some(match self.patches.get_mut(rows) {
+            Some(patch) => &mut patch.rows,
+            None => &mut self.crowds[rows - sheet_count].rows,
+        })
+    }
+
+    /// The rows of all sheets, then of all crowds.
+    fn all_rows(&self) -> impl Iterator<Item = &Rows> {
+        let sheets = self.patches.iter().map(|patch| &patch.rows);
+        sheets.chain(self.crowds.iter().map(|crowd| &crowd.rows))
+    }
+
+    fn all_rows_mut(&mut self) -> impl Iterator<Item = &mut Rows> {
+        let sheets = self.patches.iter_mut().map(|patch| &mut patch.rows);
+        sheets.chain(self.crowds.iter_mut().map(|crowd| &mut crowd.rows))
     }
 
     fn set_parameters(&mut self, constraint: u32, parameters: &ConstraintParameters) {
@@ -108,8 +150,9 @@ impl ParticleStore {
 
     fn set_bend(&mut self, bend: u32, scaled_compliance: f32) {
         let location = self.bends.locations[bend as usize];
-        match location.sheet() {
+        match location.rows() {
             None => self.graph.set_bend(location.index(), scaled_compliance),
+            // Crowds have no bends.
             Some(sheet) => self.patches[sheet].set_bend(location.index(), scaled_compliance),
         }
     }
@@ -145,20 +188,24 @@ impl ParticleStore {
         for patch in &mut self.patches {
             patch.unpack(states);
         }
+        for crowd in &mut self.crowds {
+            crowd.unpack(states);
+        }
     }
 
     /// Writes the state back at the end of a step. Returns the number of particles that froze.
     pub(crate) fn pack(&mut self, states: &mut [Particle], h: f32) -> u64 {
         let patches: u64 = self.patches.iter_mut().map(|patch| patch.pack(states, h)).sum();
-        patches + self.graph.pack(states, h)
+        let crowds: u64 = self.crowds.iter_mut().map(|crowd| crowd.pack(states, h)).sum();
+        patches + crowds + self.graph.pack(states, h)
     }
 
     /// Runs the swept stages of a substep, from `Predict` to `Advance`. Returns
     /// true if any constraint was marked as torn.
     ///
-    /// The graph and every sheet run them one after the other, each on particles of its own.
+    /// The graph, every sheet and every crowd run them one after the other, each on particles of its own.
     pub(crate) fn run_swept_stages(&mut self, inputs: &SubstepInputs<'_>, pass_count: u32) -> bool {
-        let Self { workers, graph, patches, .. } = self;
+        let Self { workers, graph, patches, crowds, .. } = self;
         let mut is_marked = false;
         let passes = || Pass::all(pass_count).take_while(|_| !inputs.is_given_up());
         for pass in passes() {
@@ -169,15 +216,21 @@ impl ParticleStore {
                 is_marked |= patch.run_pass(workers, pass, inputs);
             }
         }
+        for crowd in crowds {
+            is_marked |= crowd.run_passes(workers, pass_count, inputs);
+        }
         is_marked
     }
 
     /// Runs the stages behind the division of the sweep.
     pub(crate) fn run_ending(&mut self, inputs: &SubstepInputs<'_>) {
-        let Self { workers, graph, patches, .. } = self;
+        let Self { workers, graph, patches, crowds, .. } = self;
         graph.run_ending(workers, inputs);
         for patch in patches {
             patch.run_ending(workers, inputs);
+        }
+        for crowd in crowds {
+            crowd.run_ending(workers, inputs);
         }
     }
 
@@ -211,36 +264,40 @@ impl ParticleStore {
     /// Location of a particle, until the next [`Configured::Moved`].
     pub(crate) fn location(&self, particle: u32) -> Location {
         if let Some(Found { sheet, place }) = find_sheet(&self.sheets, particle) {
-            return Location::in_sheet(sheet, self.patches[sheet].rows.particle_index(place));
+            return Location::in_rows(sheet, self.patches[sheet].rows.particle_index(place));
+        }
+        for (number, crowd) in (self.patches.len()..).zip(&self.crowds) {
+            if let Some(index) = crowd.find(particle) {
+                return Location::in_rows(number, index);
+            }
         }
         let Some(index) = self.graph.find(particle) else {
-            unreachable!("particle {particle} is neither in a sheet nor in the graph")
+            unreachable!("particle {particle} is neither in a sheet, a crowd nor the graph")
         };
         Location::in_graph(index as usize)
     }
 
     #[inline(always)]
     pub(crate) fn position(&self, location: Location) -> [f32; 3] {
-        match location.sheet() {
+        match self.rows(location) {
             None => self.graph.position(location.index()),
-            Some(sheet) => self.patches[sheet].rows.position(location.index()),
+            Some(rows) => rows.position(location.index()),
         }
     }
 
     #[inline(always)]
     pub(crate) fn displacement(&self, location: Location) -> [f32; 3] {
-        match location.sheet() {
+        match self.rows(location) {
             None => self.graph.displacement(location.index()),
-            Some(sheet) => self.patches[sheet].rows.displacement(location.index()),
+            Some(rows) => rows.displacement(location.index()),
         }
     }
 
     pub(crate) fn set_displacement(&mut self, location: Location, displacement: [f32; 3]) {
-        match location.sheet() {
-            None => self.graph.set_displacement(location.index(), displacement),
-            Some(sheet) => {
-                self.patches[sheet].rows.set_displacement(location.index(), displacement)
-            }
+        let index = location.index();
+        match self.rows_mut(location) {
+            None => self.graph.set_displacement(index, displacement),
+            Some(rows) => rows.set_displacement(index, displacement),
         }
     }
 
@@ -248,10 +305,9 @@ impl ParticleStore {
     #[inline(always)]
     pub(crate) fn packed_particle(&self, location: Location) -> PackedParticle {
         let index = location.index();
-        match location.sheet() {
+        match self.rows(location) {
             None => self.graph.packed_particle(index),
-            Some(sheet) => {
-                let rows = &self.patches[sheet].rows;
+            Some(rows) => {
                 let ([x, y, z], [dx, dy, dz]) = (rows.position(index), rows.displacement(index));
                 PackedParticle([x, y, z, rows.inverse_mass(index), dx, dy, dz, 0.0])
             }
@@ -260,9 +316,9 @@ impl ParticleStore {
 
     /// Displacement of a particle before any constraint or contact of the substep, in a scene with colliders.
     pub(crate) fn predicted(&self, location: Location) -> [f32; 3] {
-        match location.sheet() {
+        match self.rows(location) {
             None => self.graph.predicted(location.index()),
-            Some(sheet) => self.patches[sheet].rows.predicted(location.index()),
+            Some(rows) => rows.predicted(location.index()),
         }
     }
 
@@ -273,9 +329,10 @@ impl ParticleStore {
         position: [f32; 3],
         displacement: [f32; 3],
     ) {
-        match location.sheet() {
-            None => self.graph.set_position(location.index(), position),
-            Some(sheet) => self.patches[sheet].rows.set_position(location.index(), position),
+        let index = location.index();
+        match self.rows_mut(location) {
+            None => self.graph.set_position(index, position),
+            Some(rows) => rows.set_position(index, position),
         }
         self.set_displacement(location, displacement);
     }
@@ -301,9 +358,10 @@ impl ParticleStore {
 
     /// Sets where the root of a tether is at the end of the substep.
     pub(crate) fn set_root(&mut self, TetherPlace { particle, slot }: TetherPlace, root: [f32; 3]) {
-        match particle.sheet() {
-            None => self.graph.tether_mut(particle.index(), slot).root = root,
-            Some(sheet) => self.patches[sheet].rows.set_root(particle.index(), slot, root),
+        let index = particle.index();
+        match self.rows_mut(particle) {
+            None => self.graph.tether_mut(index, slot).root = root,
+            Some(rows) => rows.set_root(index, slot, root),
         }
     }
 
@@ -313,89 +371,12 @@ impl ParticleStore {
         TetherPlace { particle, slot }: TetherPlace,
         length: f32,
     ) {
-        match particle.sheet() {
-            None => self.graph.tether_mut(particle.index(), slot).length = length,
-            Some(sheet) => {
-                self.patches[sheet].rows.set_tether_length(particle.index(), slot, length)
-            }
+        let index = particle.index();
+        match self.rows_mut(particle) {
+            None => self.graph.tether_mut(index, slot).length = length,
+            Some(rows) => rows.set_tether_length(index, slot, length),
         }
     }
-}
-
-/// A particle in a sheet.
-struct Found {
-    /// Index of the sheet.
-    sheet: usize,
-    /// Row and column.
-    place: [usize; 2],
-}
-
-/// Finds the sheet of a particle. Sheets must ascend.
-fn find_sheet(sheets: &[Sheet], particle: u32) -> Option<Found> {
-    let sheet = sheets.partition_point(|sheet| sheet.first <= particle).checked_sub(1)?;
-    Some(Found { sheet, place: sheets[sheet].find(particle)? })
-}
-
-/// Number of columns below which the padding of a row is a multiple of its particles.
-const COLUMNS_MIN: u32 = 24;
-/// Number of rows from which that padding matters. A sheet of 16 million rows with one column would
-/// occupy 19 GB; the graph holds it in 2.
-const ROWS_OF_NARROW_MAX: u32 = 1 << 16;
-
-/// Returns the sheets that are stored in rows: their particles have only constraints and bends of families,
-/// and they are not long and narrow.
-fn pure_sheets(model: &Model) -> Vec<Sheet> {
-    let mut is_pure = vec![true; model.sheets.len()];
-    let constraints = (0_u32..).zip(&model.families).filter(|(_, family)| family.is_none());
-    let bends = model.bends.iter().zip(&model.bend_families).filter(|(_, family)| family.is_none());
-    let particles = constraints
-        .flat_map(|(index, _)| model.pair(index))
-        .chain(bends.flat_map(|(bend, _)| bend.particles));
-    for particle in particles {
-        if let Some(found) = find_sheet(&model.sheets, particle) {
-            is_pure[found.sheet] = false;
-        }
-    }
-    let sheets = model.sheets.iter().zip(is_pure);
-    let is_padding = |sheet: &Sheet| sheet.columns < COLUMNS_MIN && sheet.rows > ROWS_OF_NARROW_MAX;
-    sheets
-        .filter(|(sheet, is_pure)| *is_pure && !is_padding(sheet))
-        .map(|(sheet, _)| *sheet)
-        .collect()
-}
-
-/// Returns the particles outside of the sheets, ascending.
-fn loose_particles(model: &Model, sheets: &[Sheet]) -> Vec<u32> {
-    let all = 0..model.particle_count();
-    all.filter(|particle| find_sheet(sheets, *particle).is_none()).collect()
-}
-
-/// Returns the families of each sheet.
-fn families_of(model: &Model, sheets: &[Sheet]) -> Vec<SheetFamilies> {
-    let mut has_family = vec![[false; Family::ALL.len()]; sheets.len()];
-    for (index, group) in (0_u32..).zip(&model.families) {
-        let found = find_sheet(sheets, model.pair(index)[0]);
-        if let (Some(found), Some(group)) = (found, group) {
-            has_family[found.sheet][Family::from_group(*group) as usize] = true;
-        }
-    }
-    let mut has_bends = vec![[false; BendFamily::ALL.len()]; sheets.len()];
-    for (bend, group) in model.bends.iter().zip(&model.bend_families) {
-        let found = find_sheet(sheets, bend.particles[0]);
-        if let (Some(found), Some(group)) = (found, group) {
-            has_bends[found.sheet][BendFamily::from_group(*group) as usize] = true;
-        }
-    }
-    let families =
-        has_family.into_iter().zip(has_bends).map(|(constraints, bends)| SheetFamilies {
-            constraints: present(Family::ALL, &constraints),
-            bends: present(BendFamily::ALL, &bends),
-        });
-    families.collect()
-}
-
-fn present<T, const N: usize>(all: [T; N], has: &[bool; N]) -> Vec<T> {
-    all.into_iter().zip(has).filter(|(_, has)| **has).map(|(one, _)| one).collect()
 }
 
 #[cfg(test)]

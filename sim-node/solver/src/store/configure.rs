@@ -1,8 +1,9 @@
 //! Derives the constraints of a store from the scene, the parameters and the tears.
 
+use super::ParticleStore;
 use super::graph::block::BLOCK_GROUPS;
 use super::layout::{Configured, Location, SceneFields};
-use super::{ParticleStore, find_sheet};
+use super::patch::sheets::find_sheet;
 use crate::constraints::bends::families::BendFamily;
 use crate::constraints::builder::ConstraintBuilder;
 use crate::constraints::families::Family;
@@ -40,7 +41,8 @@ impl ParticleStore {
         self.survey.restart(self.patches.len());
         for (constraint, location) in (0_u32..).zip(&self.locations) {
             let family = builder.model.families[constraint as usize].map(Family::from_group);
-            let place = location.sheet().zip(family);
+            let sheet = location.rows().filter(|rows| *rows < self.patches.len());
+            let place = sheet.zip(family);
             self.survey.observe(&builder.build(constraint), place);
         }
         let used = self.survey.fields(builder.pass_count());
@@ -119,9 +121,12 @@ impl ParticleStore {
     ) -> Configured {
         let before = self.layout;
         self.layout = before.extended(used, scene);
-        self.graph.use_fields(self.layout, self.survey.graph_softness());
+        self.graph.use_fields(self.layout, self.survey.loose_softness());
         for (index, patch) in self.patches.iter_mut().enumerate() {
             patch.use_fields(self.layout, self.survey.family_softness(index));
+        }
+        for crowd in &mut self.crowds {
+            crowd.use_fields(self.layout, self.survey.loose_softness());
         }
         if self.is_allocated && self.layout.fits(&before) {
             return Configured::InPlace;
@@ -130,8 +135,11 @@ impl ParticleStore {
         for patch in &mut self.patches {
             patch.allocate();
         }
+        for crowd in &mut self.crowds {
+            crowd.allocate();
+        }
         self.locate_constraints(model);
-        let widest = self.sheets.iter().map(|sheet| sheet.columns as usize).max();
+        let widest = self.all_rows().map(|rows| rows.layout.columns).max();
         let largest = (8 * BLOCK_GROUPS).min(self.graph.particle_count()).max(widest.unwrap_or(0));
         self.contact_room.block_length = if scene.colliders { largest } else { 0 };
         self.workers.reserve_contacts(self.contact_room);
@@ -139,8 +147,14 @@ impl ParticleStore {
         Configured::Moved
     }
 
-    /// Updates the locations of the constraints and bends of sheets, whose indices depend on the layout.
+    /// Updates the locations of the constraints and bends of sheets and crowds, whose indices depend on the
+    /// layout.
     pub(super) fn locate_constraints(&mut self, model: &Model) {
+        for (number, crowd) in (self.patches.len()..).zip(&self.crowds) {
+            for (constraint, index) in crowd.constraint_indices() {
+                self.locations[constraint as usize] = Location::in_rows(number, index);
+            }
+        }
         if self.patches.is_empty() {
             return;
         }
@@ -151,7 +165,7 @@ impl ParticleStore {
                 let [row, column] = found.place;
                 let place = [row, column - family.shifts()[0]];
                 let index = self.patches[found.sheet].constraint_index(family, place);
-                self.locations[constraint as usize] = Location::in_sheet(found.sheet, index);
+                self.locations[constraint as usize] = Location::in_rows(found.sheet, index);
             }
         }
         for (bend, group) in (0_u32..).zip(&model.bend_families) {
@@ -159,7 +173,7 @@ impl ParticleStore {
             if let (Some(found), Some(group)) = (found, group) {
                 let family = BendFamily::from_group(*group);
                 let index = self.patches[found.sheet].bend_index(family, found.place);
-                self.bends.locations[bend as usize] = Location::in_sheet(found.sheet, index);
+                self.bends.locations[bend as usize] = Location::in_rows(found.sheet, index);
             }
         }
     }

@@ -5,7 +5,8 @@ use glam::DVec3;
 use super::graph::Graph;
 use super::graph::forces::Projections;
 use super::pulls::{Pull, Receivers, TetherEnds};
-use super::{Location, ParticleStore, find_sheet};
+use super::rows::RowForces;
+use super::{Location, ParticleStore};
 use crate::contacts::contact::reaction::{BlockReaction, Reaction, ReactionSum};
 use crate::scene::model::Model;
 use crate::state::particles::Particle;
@@ -21,7 +22,7 @@ struct Link {
 #[derive(Clone, Copy)]
 struct LinkPlace {
     /// None for the graph.
-    sheet: Option<usize>,
+    rows: Option<usize>,
     projection: usize,
 }
 
@@ -37,25 +38,29 @@ impl ParticleStore {
     ) {
         let projections = self.graph.projections();
         let mut in_graph = Vec::new();
-        let mut in_sheets = vec![Vec::new(); self.patches.len()];
+        let mut in_rows = vec![Vec::new(); self.patches.len() + self.crowds.len()];
         for link in self.links(model, &projections) {
-            let pulls = match link.place.sheet {
+            let pulls = match link.place.rows {
                 None => &mut in_graph,
-                Some(sheet) => &mut in_sheets[sheet],
+                Some(rows) => &mut in_rows[rows],
             };
             self.push_pulls(&link, states, receivers, pulls);
         }
         self.graph.measure_forces(in_graph, projections, receivers.collider_count);
-        for (patch, pulls) in self.patches.iter_mut().zip(in_sheets) {
+        let mut in_rows = in_rows.into_iter();
+        for (patch, pulls) in self.patches.iter_mut().zip(&mut in_rows) {
             patch.measure_forces(pulls, receivers.collider_count);
+        }
+        for (crowd, pulls) in self.crowds.iter_mut().zip(in_rows) {
+            crowd.measure_forces(pulls, receivers.collider_count);
         }
         for TetherEnds { particle, slot, root } in tethers {
             let Some(receiver) = receivers.of_particles[root as usize] else { continue };
             let location = self.location(particle);
             let index = location.index();
-            match location.sheet() {
+            match self.rows_mut(location) {
                 None => self.graph.set_tether_receiver(index, slot, receiver),
-                Some(sheet) => self.patches[sheet].set_tether_receiver(index, slot, receiver),
+                Some(rows) => rows.set_tether_receiver(index, slot, receiver),
             }
         }
     }
@@ -65,6 +70,9 @@ impl ParticleStore {
         self.graph.forget_forces();
         for patch in &mut self.patches {
             patch.forget_forces();
+        }
+        for crowd in &mut self.crowds {
+            crowd.rows.forces = RowForces::default();
         }
     }
 
@@ -94,16 +102,18 @@ impl ParticleStore {
         &mut self,
         collider_count: usize,
     ) -> impl Iterator<Item = &mut [BlockReaction]> {
-        let sheets = self.patches.iter_mut().map(|patch| &mut patch.forces_mut().reactions);
-        let parts = std::iter::once(&mut self.graph.forces_mut().reactions).chain(sheets);
+        let sheets = self.patches.iter_mut().map(|patch| &mut patch.rows);
+        let rows = sheets.chain(self.crowds.iter_mut().map(|crowd| &mut crowd.rows));
+        let in_rows = rows.map(|rows| &mut rows.forces.reactions);
+        let parts = std::iter::once(&mut self.graph.forces_mut().reactions).chain(in_rows);
         parts.flat_map(move |part| part.chunks_exact_mut(collider_count.max(1)))
     }
 
     /// Moves the impulses of a step, times the length of a substep, to those of the fixed particles.
     pub(crate) fn take_pulls(&mut self, impulses: &mut [DVec3]) {
         self.graph.take_pulls(impulses);
-        for patch in &mut self.patches {
-            patch.take_pulls(impulses);
+        for rows in self.all_rows_mut() {
+            rows.take_pulls(impulses);
         }
     }
 
@@ -119,9 +129,13 @@ impl ParticleStore {
             Link {
                 particles: [a, b, a, a],
                 coefficients: [1.0, -1.0, 0.0, 0.0],
-                place: self.place_of(location, a, |sheet, row| match sheet {
+                place: self.place_of(location, |row| match location.rows() {
                     None => self.graph.projection_of_constraint(projections, location.index()),
-                    Some(sheet) => self.patches[sheet].projection_of_constraint(*family, row),
+                    Some(rows) => match self.patches.get(rows) {
+                        Some(patch) => patch.projection_of_constraint(*family, row),
+                        None => self.crowds[rows - self.patches.len()]
+                            .projection_of_constraint(location.index()),
+                    },
                 }),
             }
         });
@@ -131,7 +145,7 @@ impl ParticleStore {
             Link {
                 particles: bend.particles,
                 coefficients: bend.coefficients,
-                place: self.place_of(location, bend.particles[0], |sheet, row| match sheet {
+                place: self.place_of(location, |row| match location.rows() {
                     None => self.graph.projection_of_bend(projections, location.index()),
                     Some(sheet) => self.patches[sheet].projection_of_bend(*family, row),
                 }),
@@ -140,18 +154,10 @@ impl ParticleStore {
         constraints.chain(bends)
     }
 
-    fn place_of(
-        &self,
-        location: Location,
-        first_particle: u32,
-        projection: impl Fn(Option<usize>, usize) -> usize,
-    ) -> LinkPlace {
-        let sheet = location.sheet();
-        let row = match sheet {
-            None => 0,
-            Some(_) => find_sheet(&self.sheets, first_particle).map_or(0, |found| found.place[0]),
-        };
-        LinkPlace { sheet, projection: projection(sheet, row) }
+    /// Place of a constraint or bend, where `projection` tells its number for the row in which it begins.
+    fn place_of(&self, location: Location, projection: impl Fn(usize) -> usize) -> LinkPlace {
+        let row = self.rows(location).map_or(0, |rows| location.index() / rows.layout.length);
+        LinkPlace { rows: location.rows(), projection: projection(row) }
     }
 
     /// Pushes a pull for each fixed particle of a constraint or bend.
@@ -184,9 +190,9 @@ impl ParticleStore {
     /// Where the x displacement of a particle is among the numbers of the graph or its sheet.
     fn displacement_place(&self, particle: u32) -> usize {
         let location = self.location(particle);
-        match location.sheet() {
+        match self.rows(location) {
             None => Graph::displacement_place(location.index()),
-            Some(sheet) => self.patches[sheet].rows.displacement_place(location.index()),
+            Some(rows) => rows.displacement_place(location.index()),
         }
     }
 }

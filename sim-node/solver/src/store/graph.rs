@@ -13,8 +13,9 @@ use batch::Batch;
 use bends::GraphBends;
 use block::{BLOCK_GROUPS, BlockWork, GraphBlock, PackedTether};
 use forces::{GraphForces, MovedParticles};
-use group::{ConstraintGroup, part_count};
-use indices::find_particle;
+use group::ConstraintGroup;
+pub(crate) use group::part_count;
+pub(crate) use indices::find_particle;
 use wind::{GraphWindWork, TriangleGroup, triangle_groups};
 
 use super::layout::{Layout, Location, SceneFields};

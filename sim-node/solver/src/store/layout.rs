@@ -85,10 +85,10 @@ pub(crate) enum Configured {
     Moved,
 }
 
-/// Location of a particle or a constraint: an index in the graph or in a sheet.
+/// Location of a particle or a constraint: an index in the graph, or in the rows of a sheet or a crowd.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Location {
-    /// 0 for the graph, else 1 + the index of the sheet.
+    /// 0 for the graph, else 1 + the number of the rows.
     part: u32,
     index: u32,
 }
@@ -98,8 +98,9 @@ impl Location {
         Self::new(0, index)
     }
 
-    pub(crate) fn in_sheet(sheet: usize, index: usize) -> Self {
-        Self::new(sheet + 1, index)
+    /// Rows are numbered sheet by sheet, then crowd by crowd.
+    pub(crate) fn in_rows(rows: usize, index: usize) -> Self {
+        Self::new(rows + 1, index)
     }
 
     /// A sheet has at most 2^24 particles. With at most 93 fields in columns of up to 64 numbers for 25
@@ -115,8 +116,8 @@ impl Location {
         self.index as usize
     }
 
-    /// Index of the sheet. None for the graph.
-    pub(crate) fn sheet(self) -> Option<usize> {
+    /// Number of the rows. None for the graph.
+    pub(crate) fn rows(self) -> Option<usize> {
         (self.part as usize).checked_sub(1)
     }
 }

@@ -6,13 +6,14 @@ mod bend_layout;
 mod bends;
 mod measure;
 mod sheet_layout;
+pub(crate) mod sheets;
 mod span;
 mod wind;
 
 use std::ops::Range;
 
 use band::{Band, PassSweep, SweepWork};
-use band_forces::SheetForces;
+use band_forces::BandForces;
 use bend_layout::BendLayout;
 use sheet_layout::{SheetLayout, band_count};
 use span::Span;
@@ -50,7 +51,8 @@ pub(crate) struct Patch {
     layout: SheetLayout,
     column_order: ColumnOrder,
     schedule: Schedule,
-    forces: SheetForces,
+    /// By row: bit n is set if its projection n has pulls. Empty while nobody asks for forces.
+    pull_masks: Vec<u32>,
 }
 
 impl Patch {
@@ -63,7 +65,7 @@ impl Patch {
             layout,
             column_order: ColumnOrder::default(),
             schedule: Schedule::default(),
-            forces: SheetForces::default(),
+            pull_masks: Vec::new(),
         }
     }
 
@@ -114,7 +116,7 @@ impl Patch {
 
     /// Writer for the constraints, by [`Self::constraint_index`].
     pub(crate) fn writer(&mut self) -> ColumnWriter<'_> {
-        let (layout, numbers) = self.rows.split_mut();
+        let (layout, numbers, _) = self.rows.split_mut();
         ColumnWriter::new(numbers, layout.stride, self.column_order)
     }
 
@@ -181,9 +183,9 @@ impl Patch {
         (stages, pass): (&[ScheduledStage], Pass),
         inputs: &SubstepInputs<'_>,
     ) -> bool {
-        let (sheet, forces) = (&self.layout, &mut self.forces);
-        let is_measured = forces.is_measured();
-        let (layout, numbers) = self.rows.split_mut();
+        let (sheet, pull_masks) = (&self.layout, self.pull_masks.as_slice());
+        let (layout, numbers, forces) = self.rows.split_mut();
+        let is_measured = forces.is_measured;
         let kernels = workers.kernels;
         let reach = stages.iter().map(|stage| stage.reach).sum();
         let count = band_count(layout, workers.count(), reach);
@@ -196,7 +198,8 @@ impl Patch {
             }
         };
         if count == 1 {
-            let band = Band { numbers, first: 0, layout, sheet, forces: forces.all(sheet) };
+            let forces = BandForces::new(forces, pull_masks, sheet.pull_groups());
+            let band = Band { numbers, first: 0, layout, sheet, forces };
             let span = Span::new(0..layout.rows, layout.rows);
             return run(band, span, workers.own_scratch());
         }
@@ -214,8 +217,8 @@ impl Patch {
                     part.is_marked = run(band, part.span.clone(), scratch);
                 }
             };
-            let whole =
-                Band { numbers: &mut *numbers, first: 0, layout, sheet, forces: forces.all(sheet) };
+            let forces = BandForces::new(&mut *forces, pull_masks, sheet.pull_groups());
+            let whole = Band { numbers: &mut *numbers, first: 0, layout, sheet, forces };
             let parts = BandPart::split(whole, spans);
             workers.for_each(parts, work, |part| is_marked |= part.is_marked);
         };
@@ -243,7 +246,7 @@ impl Patch {
 
     /// Computes the velocities that the wind adds in the running substep.
     pub(crate) fn blow(&mut self, kernels: Kernels, wind: &WindStep) {
-        let (layout, numbers) = self.rows.split_mut();
+        let (layout, numbers, _) = self.rows.split_mut();
         kernels.run(SheetWindWork { numbers, layout, wind });
     }
 }

@@ -5,11 +5,11 @@ use crate::kernels::lanes::{LaneWork, PackedParticle, Wide, axes};
 /// Where the path of every particle begins, its displacement in a substep, and its tile.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Paths {
-    /// By patch.
-    pub(super) sheets: Vec<Vec<f32>>,
+    /// By rows of the store.
+    pub(super) in_rows: Vec<Vec<f32>>,
     pub(super) graph: Vec<PackedParticle>,
     /// The tile of every particle, in the same order.
-    pub(super) tiles_of_sheets: Vec<Vec<u32>>,
+    pub(super) tiles_in_rows: Vec<Vec<u32>>,
     pub(super) tiles_of_graph: Vec<u32>,
 }
 

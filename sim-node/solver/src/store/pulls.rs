@@ -116,6 +116,12 @@ impl<'a> PullsPart<'a> {
         (part(before, first), part(behind, next))
     }
 
+    /// Returns true if a projection has pulls.
+    #[inline(always)]
+    pub(crate) fn has(&self, projection: usize) -> bool {
+        self.ranges.get(projection).is_some_and(|[first, end]| first < end)
+    }
+
     /// Notes the displacements before a projection.
     #[inline(always)]
     pub(crate) fn note(&mut self, projection: usize, numbers: Numbers<'_>) {

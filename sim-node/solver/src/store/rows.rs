@@ -5,11 +5,13 @@
 //! rows, or between two parts of one, combines eight columns with eight others, without indices.
 
 pub(crate) mod ends;
+mod forces;
 mod layout;
+mod measure;
 pub(crate) mod particles;
 mod paths;
-pub(crate) mod tether_forces;
 
+pub(crate) use forces::RowForces;
 pub(crate) use layout::{LINE_LENGTH, RowLayout, STATE_FIELDS};
 
 use crate::kernels::huge_pages::refill;
@@ -25,6 +27,7 @@ struct CacheLine([f32; LINE_LENGTH]);
 pub(crate) struct Rows {
     pub(crate) layout: RowLayout,
     lines: Vec<CacheLine>,
+    pub(crate) forces: RowForces,
 }
 
 /// The state fields of a row.
@@ -50,7 +53,7 @@ impl<'a> RowState<'a> {
 impl Rows {
     /// Makes rows without memory.
     pub(crate) fn new(layout: RowLayout) -> Self {
-        Self { layout, lines: Vec::new() }
+        Self { layout, lines: Vec::new(), forces: RowForces::default() }
     }
 
     /// Allocates the fields of the layout. All numbers are 0 afterwards, and no particle has a tether.
@@ -75,9 +78,10 @@ impl Rows {
         bytemuck::cast_slice_mut(&mut self.lines)
     }
 
-    /// The layout, and all numbers.
-    pub(crate) fn split_mut(&mut self) -> (&RowLayout, &mut [f32]) {
-        (&self.layout, bytemuck::cast_slice_mut(&mut self.lines))
+    /// The layout, all numbers, and the forces.
+    pub(crate) fn split_mut(&mut self) -> (&RowLayout, &mut [f32], &mut RowForces) {
+        let Self { layout, lines, forces } = self;
+        (layout, bytemuck::cast_slice_mut(lines), forces)
     }
 
     /// The state of a row.

@@ -13,8 +13,8 @@ pub(crate) struct Survey {
     fields: ConstraintFields,
     /// True if any constraint is soft.
     is_soft: bool,
-    /// Softness of the first constraint of the graph.
-    graph_softness: Option<PassSoftness>,
+    /// Softness of the first constraint outside of sheets.
+    loose_softness: Option<PassSoftness>,
     /// By sheet.
     family_softness: Vec<FamilySoftness>,
 }
@@ -22,7 +22,7 @@ pub(crate) struct Survey {
 impl Survey {
     /// Forgets everything.
     pub(crate) fn restart(&mut self, sheet_count: usize) {
-        (self.fields, self.is_soft, self.graph_softness) = Default::default();
+        (self.fields, self.is_soft, self.loose_softness) = Default::default();
         self.family_softness.clear();
         self.family_softness.resize(sheet_count, FamilySoftness::default());
     }
@@ -33,7 +33,7 @@ impl Survey {
         self.fields = ConstraintFields { softness, floors, ..ConstraintFields::default() };
     }
 
-    /// Adds a constraint of the graph, or of a family of a sheet.
+    /// Adds a constraint outside of sheets, or of a family of a sheet.
     ///
     /// # Panics
     /// If the constraints of a family differ in their softness.
@@ -45,7 +45,7 @@ impl Survey {
         let softness = parameters.softness;
         match family {
             None => {
-                let first = self.graph_softness.get_or_insert(softness);
+                let first = self.loose_softness.get_or_insert(softness);
                 self.fields.softness |= *first != softness;
             }
             Some((sheet, family)) => {
@@ -74,9 +74,9 @@ impl Survey {
         ConstraintFields { multipliers, ..self.fields }
     }
 
-    /// Softness of the constraints of the graph, unless they differ.
-    pub(crate) fn graph_softness(&self) -> PassSoftness {
-        self.graph_softness.unwrap_or_default()
+    /// Softness of the constraints outside of sheets, unless they differ.
+    pub(crate) fn loose_softness(&self) -> PassSoftness {
+        self.loose_softness.unwrap_or_default()
     }
 
     pub(crate) fn family_softness(&self, sheet: usize) -> &FamilySoftness {
@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn constraints_of_the_graph_may_differ_in_their_softness() {
+    fn constraints_outside_of_sheets_may_differ_in_their_softness() {
         let mut survey = Survey::default();
         survey.restart(0);
         observe(&mut survey, 1.0, None);

@@ -63,6 +63,53 @@ fn a_hanging_rope_pulls_its_pin_with_its_weight() {
     }
 }
 
+/// Equal figures lie side by side in memory: each has its own pin and mass.
+#[test]
+fn each_of_many_pendulums_pulls_its_pin_with_its_weight() {
+    for settings in ["damping = 2\n", "damping = 2\ntethers = 1\n"] {
+        let mut text = rates(120, 4) + settings;
+        for pendulum in 0..11 {
+            let (x, mass) = (f64::from(pendulum), 0.1 + 0.05 * f64::from(pendulum));
+            text += &format!(
+                "[[particle]]\nposition = [{x}, 1, 0]\npinned = true\n\
+                 [[particle]]\nposition = [{x}, 0, 0]\nmass = {mass}\n"
+            );
+        }
+        for pin in (0..22).step_by(2) {
+            text += &format!("[[constraint]]\nparticles = [{pin}, {}]\n", pin + 1);
+        }
+        // A floor that holds nothing but a last, loose particle.
+        text += "[[particle]]\nposition = [0, -1.999, 5]\nmass = 0.3\n\
+            [[collider]]\nshape = \"plane\"\nnormal = [0, 1, 0]\noffset = -2\n";
+        let mut solver = measured(&text);
+        step(&mut solver, 2400);
+        let pins = &forces(&solver).particles;
+        assert_eq!(pins.len(), 11);
+        for (pin, one) in (0..).zip(pins) {
+            let weight = (0.1 + 0.05 * f64::from(pin)) * 9.81;
+            assert_eq!(one.particle, 2 * pin);
+            assert_near("pull", -weight, vector(one.impulse).y * 120.0, 1e-3 * weight);
+        }
+        assert_near("floor", -0.3 * 9.81, collider_force(&solver, 120).y, 1e-2);
+    }
+}
+
+/// Loose particles lie side by side, too.
+#[test]
+fn grains_at_rest_weigh_what_they_weigh() {
+    let mut text = format!("{}damping = 3\n{FLOOR}friction = 0.5\n", rates(120, 4));
+    for grain in 0..21 {
+        text += &format!("[[particle]]\nposition = [{grain}, 0.001, 0]\nmass = 0.2\n");
+    }
+    let mut solver = measured(&text);
+    step(&mut solver, 600);
+    let weight = 21.0 * 0.2 * 9.81;
+    assert_near("weight", -weight, collider_force(&solver, 120).y, 1e-2 * weight);
+    let turning = vector(forces(&solver).colliders[0].impulse.angular) * 120.0;
+    assert_near("about the origin", -10.0 * weight, turning.z, 1e-2 * weight);
+    assert_eq!(forces(&solver).colliders[0].contacts, 21);
+}
+
 #[test]
 fn a_sheet_at_rest_weighs_what_it_weighs_on_every_shape() {
     let shapes = [

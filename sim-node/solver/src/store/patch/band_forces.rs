@@ -1,65 +1,9 @@
 //! Forces of the particles of some rows on colliders and fixed particles.
 
-use super::sheet_layout::SheetLayout;
 use crate::contacts::contact::reaction::BlockReaction;
-use crate::store::pulls::{Pulls, PullsPart};
-use crate::store::rows::RowLayout;
+use crate::store::pulls::PullsPart;
+use crate::store::rows::RowForces;
 use crate::store::rows::particles::TetherPulls;
-use crate::store::rows::tether_forces::TetherForces;
-
-/// The forces of a sheet. Empty while nobody asks for them.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct SheetForces {
-    pub(crate) pulls: Pulls,
-    /// By row: bit n is set if its projection n has pulls.
-    pull_masks: Vec<u32>,
-    /// By row, then by collider.
-    pub(crate) reactions: Vec<BlockReaction>,
-    /// Number of reactions of a row.
-    reaction_count: usize,
-    pub(crate) tethers: TetherForces,
-}
-
-impl SheetForces {
-    /// Makes room for a sheet, without tethers.
-    pub(crate) fn new(
-        pulls: Pulls,
-        layout: &RowLayout,
-        pull_groups: usize,
-        collider_count: usize,
-    ) -> Self {
-        let count = pull_groups;
-        let mask =
-            |row| (0..count).fold(0, |mask, n| mask | u32::from(pulls.has(row * count + n)) << n);
-        Self {
-            pull_masks: (0..layout.rows).map(mask).collect(),
-            pulls,
-            reactions: vec![BlockReaction::default(); layout.rows * collider_count],
-            reaction_count: collider_count,
-            tethers: TetherForces::new(layout),
-        }
-    }
-
-    /// Returns true if somebody asks for forces.
-    pub(crate) fn is_measured(&self) -> bool {
-        !self.pull_masks.is_empty()
-    }
-
-    /// All rows.
-    pub(crate) fn all(&mut self, layout: &SheetLayout) -> BandForces<'_> {
-        let Self { pulls, pull_masks, reactions, reaction_count, tethers } = self;
-        BandForces {
-            first: 0,
-            pull_masks,
-            pull_groups: layout.pull_groups(),
-            reaction_count: *reaction_count,
-            tether_length: tethers.length,
-            pulls: pulls.whole(),
-            reactions,
-            tether_pulls: &mut tethers.pulls,
-        }
-    }
-}
 
 /// The forces of consecutive rows.
 #[derive(Debug)]
@@ -80,6 +24,26 @@ pub(crate) struct BandForces<'a> {
 }
 
 impl<'a> BandForces<'a> {
+    /// All rows. `pull_masks` is empty while nobody asks for forces.
+    pub(crate) fn new(
+        forces: &'a mut RowForces,
+        pull_masks: &'a [u32],
+        pull_groups: usize,
+    ) -> Self {
+        let RowForces { pulls, reactions, reaction_count, tether_pulls, tether_length, .. } =
+            forces;
+        Self {
+            first: 0,
+            pull_masks,
+            pull_groups,
+            reaction_count: *reaction_count,
+            tether_length: *tether_length,
+            pulls: pulls.whole(),
+            reactions,
+            tether_pulls,
+        }
+    }
+
     /// Splits before a row.
     pub(crate) fn split_at(self, row: usize) -> (BandForces<'a>, BandForces<'a>) {
         let Self { first, pull_masks, pull_groups, reaction_count, tether_length, .. } = self;

@@ -1,37 +1,24 @@
 //! The measurement of forces in a sheet.
 
-use glam::DVec3;
-
 use super::Patch;
-use super::band_forces::SheetForces;
 use crate::constraints::families::Family;
 use crate::store::pulls::{Pull, Pulls};
+use crate::store::rows::RowForces;
 
 impl Patch {
     /// Measures these pulls, and the reactions of colliders, in each further step.
     pub(crate) fn measure_forces(&mut self, pulls: Vec<Pull>, collider_count: usize) {
-        let (layout, pull_groups) = (&self.rows.layout, self.layout.pull_groups());
-        let pulls = Pulls::new(pulls, layout.rows * pull_groups);
-        self.forces = SheetForces::new(pulls, layout, pull_groups, collider_count);
+        let (rows, count) = (self.rows.layout.rows, self.layout.pull_groups());
+        let pulls = Pulls::new(pulls, rows * count);
+        let mask =
+            |row| (0..count).fold(0, |mask, n| mask | u32::from(pulls.has(row * count + n)) << n);
+        self.pull_masks = (0..rows).map(mask).collect();
+        self.rows.measure_forces(pulls, collider_count);
     }
 
     pub(crate) fn forget_forces(&mut self) {
-        self.forces = SheetForces::default();
-    }
-
-    pub(crate) fn forces_mut(&mut self) -> &mut SheetForces {
-        &mut self.forces
-    }
-
-    /// Sets the root of a tether of the particle with this index.
-    pub(crate) fn set_tether_receiver(&mut self, index: usize, slot: usize, receiver: u32) {
-        self.forces.tethers.set_receiver(&self.rows.layout, (index, slot), receiver);
-    }
-
-    /// Moves the impulses of a step, times the length of a substep, to those of the fixed particles.
-    pub(crate) fn take_pulls(&mut self, impulses: &mut [DVec3]) {
-        self.forces.pulls.take(impulses);
-        self.forces.tethers.take(&self.rows, impulses);
+        self.pull_masks = Vec::new();
+        self.rows.forces = RowForces::default();
     }
 
     /// Number of the projection of a constraint of a family's group that begins in a row.

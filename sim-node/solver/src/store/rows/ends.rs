@@ -29,6 +29,36 @@ impl<'a> Ends<'a> {
         }
     }
 
+    /// The `count` lane groups from each of two columns on, which must not overlap.
+    #[inline(always)]
+    pub(crate) fn pair(
+        state: &'a mut [f32],
+        stride: usize,
+        columns: [usize; 2],
+        count: usize,
+    ) -> [Self; 2] {
+        let (fixed, d) = state[..STATE_FIELDS * stride].split_at_mut(4 * stride);
+        let (dx, d) = d.split_at_mut(stride);
+        let (dy, dz) = d.split_at_mut(stride);
+        let [ax, bx] = two_groups_mut(dx, columns, count);
+        let [ay, by] = two_groups_mut(dy, columns, count);
+        let [az, bz] = two_groups_mut(dz, columns, count);
+        [
+            Self::from_fields(fixed, stride, columns[0], [ax, ay, az]),
+            Self::from_fields(fixed, stride, columns[1], [bx, by, bz]),
+        ]
+    }
+
+    #[inline(always)]
+    fn from_fields(fixed: &'a [f32], stride: usize, from: usize, d: [&'a mut [Lanes8]; 3]) -> Self {
+        let count = d[0].len();
+        // (As a closure it would compile to a call.)
+        let x = lane_groups(&fixed[..stride], from, count);
+        let y = lane_groups(&fixed[stride..2 * stride], from, count);
+        let z = lane_groups(&fixed[2 * stride..3 * stride], from, count);
+        Self { x: [x, y, z], w: lane_groups(&fixed[3 * stride..4 * stride], from, count), d }
+    }
+
     /// The first `count` lane groups, in a form that shows the compiler their number.
     #[inline(always)]
     pub(crate) fn shortened(self, count: usize) -> Self {
@@ -40,7 +70,14 @@ impl<'a> Ends<'a> {
     }
 }
 
-/// Projects constraints between two rows.
+#[inline(always)]
+fn two_groups_mut(field: &mut [f32], [a, b]: [usize; 2], count: usize) -> [&mut [Lanes8]; 2] {
+    let (low, high) = field.split_at_mut(a.max(b));
+    let (low, high) = (lane_groups_mut(low, a.min(b), count), lane_groups_mut(high, 0, count));
+    if a < b { [low, high] } else { [high, low] }
+}
+
+/// Projects constraints between two rows, or between two parts of one.
 #[inline(always)]
 pub(crate) fn project_down<W: Wide>(
     upper: Ends<'_>,

@@ -1,53 +1,51 @@
-//! Forces of the tethers of particles in rows.
+//! The measurement of forces in rows.
 
 use glam::DVec3;
 
 use super::Rows;
+use super::forces::RowForces;
 use super::layout::RowLayout;
 use super::particles::TetherPulls;
+use crate::contacts::contact::reaction::BlockReaction;
 use crate::kernels::lanes::{Lanes8, axes, lane_groups};
+use crate::store::pulls::Pulls;
 
-/// What tethers have taken from particles in this step. Empty while nobody asks for forces.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct TetherForces {
-    /// By row, tether and eight columns: the displacements.
-    pub(crate) pulls: Vec<TetherPulls>,
-    /// Number of pulls of a row.
-    pub(crate) length: usize,
-    /// By row, tether and eight columns: index of the root among the fixed particles.
-    receivers: Vec<[Option<u32>; 8]>,
-}
-
-impl TetherForces {
-    /// Makes room for rows, without tethers.
-    pub(crate) fn new(layout: &RowLayout) -> Self {
-        let length = layout.fields.scene.tethers * layout.columns.div_ceil(8);
-        let count = layout.rows * length;
-        Self { pulls: vec![[[0.0; 8]; 3]; count], length, receivers: vec![[None; 8]; count] }
+impl Rows {
+    /// Measures these pulls, and the reactions of colliders, in each further step. No tether has a root yet.
+    pub(crate) fn measure_forces(&mut self, pulls: Pulls, collider_count: usize) {
+        let RowLayout { rows, columns, ref fields, .. } = self.layout;
+        let tether_length = fields.scene.tethers * columns.div_ceil(8);
+        self.forces = RowForces {
+            is_measured: true,
+            pulls,
+            reactions: vec![BlockReaction::default(); rows * collider_count],
+            reaction_count: collider_count,
+            tether_pulls: vec![[[0.0; 8]; 3]; rows * tether_length],
+            tether_length,
+            tether_receivers: vec![[None; 8]; rows * tether_length],
+        };
     }
 
     /// Sets the root of a tether of the particle with this index.
-    pub(crate) fn set_receiver(
-        &mut self,
-        layout: &RowLayout,
-        (index, slot): (usize, usize),
-        receiver: u32,
-    ) {
+    pub(crate) fn set_tether_receiver(&mut self, index: usize, slot: usize, receiver: u32) {
+        let Self { layout, forces, .. } = self;
         let (row, column) = (index / layout.length, index % layout.length);
-        let group = row * self.length + slot * layout.columns.div_ceil(8) + column / 8;
-        self.receivers[group][column % 8] = Some(receiver);
+        let group = row * forces.tether_length + slot * layout.columns.div_ceil(8) + column / 8;
+        forces.tether_receivers[group][column % 8] = Some(receiver);
     }
 
     /// Moves the impulses of a step, times the length of a substep, to those of the fixed particles.
-    pub(crate) fn take(&mut self, rows: &Rows, impulses: &mut [DVec3]) {
-        let (layout, length) = (&rows.layout, self.length);
-        let rows = rows.numbers().chunks_exact(layout.length);
+    pub(crate) fn take_pulls(&mut self, impulses: &mut [DVec3]) {
+        let (layout, numbers, forces) = self.split_mut();
+        forces.pulls.take(impulses);
+        let rows = numbers.chunks_exact(layout.length);
+        let length = forces.tether_length;
         let count = layout.columns.div_ceil(8);
         for group in 0..length {
             // Tethers of a column often have one root.
             let (mut sums, mut last) = ([[0.0; 8]; 3], &[None; 8]);
-            let pulls = self.pulls[group..].iter_mut().step_by(length);
-            let receivers = self.receivers[group..].iter().step_by(length);
+            let pulls = forces.tether_pulls[group..].iter_mut().step_by(length);
+            let receivers = forces.tether_receivers[group..].iter().step_by(length);
             for (row, (pulls, receivers)) in rows.clone().zip(pulls.zip(receivers)) {
                 // Many are slack in all of a step.
                 if is_zero(pulls) {

@@ -3,6 +3,8 @@
 //! that of a vector, and with every property of a constraint.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
+mod crowds;
+
 use sim_solver::{Grab, Kernels, ParameterValue, Push, Scene, Solver, Sphere, TearCause, builtin};
 
 /// Steps all kernels side by side with the same commands, compares every particle, and returns the
@@ -72,12 +74,12 @@ fn kernels_agree_on_every_built_in_scene() {
 #[test]
 fn kernels_agree_on_scenes_with_every_mechanism() {
     for text in [
-        include_str!("scenes/everything.toml"),
-        include_str!("scenes/stiffness.toml"),
-        include_str!("scenes/touching.toml"),
-        include_str!("scenes/surfaces.toml"),
-        include_str!("scenes/draped.toml"),
-        include_str!("scenes/bends.toml"),
+        include_str!("../scenes/everything.toml"),
+        include_str!("../scenes/stiffness.toml"),
+        include_str!("../scenes/touching.toml"),
+        include_str!("../scenes/surfaces.toml"),
+        include_str!("../scenes/draped.toml"),
+        include_str!("../scenes/bends.toml"),
     ] {
         assert_same_bits(text, "test", 300);
     }
@@ -152,7 +154,7 @@ fn kernels_agree_on_sheets_of_every_size_around_a_vector() {
 }
 
 /// Eight particles share the instructions of a contact, and nothing else: in a row of a sheet, with
-/// padding, and in the graph.
+/// padding, in a crowd, and in the graph.
 #[test]
 fn a_particle_has_the_same_contacts_alone_as_among_others() {
     const COLLIDERS: &str = "version = 1\n[solver]\nrate_hz = 120\nsubsteps = 3\n\
@@ -170,9 +172,18 @@ fn a_particle_has_the_same_contacts_alone_as_among_others() {
     let starts: Vec<_> = together.particles().iter().map(|one| one.position).collect();
     let particle = |at: &[f32; 3]| format!("[[particle]]\nposition = {at:?}\nmass = 0.01\n");
     let all: String = starts.iter().map(&particle).collect();
-    let mut in_graph =
-        Solver::new(&Scene::from_toml(&(COLLIDERS.to_owned() + &all), "graph").unwrap());
-    (0..90).for_each(|_| (together.step(), in_graph.step()).0);
+    let all = COLLIDERS.to_owned() + &all;
+    let mut in_crowd = Solver::new(&Scene::from_toml(&all, "crowd").unwrap());
+    // Tethers that never act make one figure of all particles.
+    let tether = |one| {
+        format!(
+            "[[constraint]]\nparticles = [{one}, {}]\nkind = \"tether\"\nrest_length = 99\n",
+            one + 1
+        )
+    };
+    let joined: String = (0..starts.len() - 1).map(tether).collect();
+    let mut in_graph = Solver::new(&Scene::from_toml(&(all + &joined), "graph").unwrap());
+    (0..90).for_each(|_| (together.step(), in_crowd.step(), in_graph.step()).0);
     let mut touching_count = 0;
     for (index, start) in starts.iter().enumerate().filter(|(index, _)| ![3, 20].contains(index)) {
         let text = COLLIDERS.to_owned() + &particle(start);
@@ -180,6 +191,7 @@ fn a_particle_has_the_same_contacts_alone_as_among_others() {
         (0..90).for_each(|_| alone.step());
         let state = alone.particle(0);
         assert_eq!(together.particle(index), state, "particle {index} of the sheet");
+        assert_eq!(in_crowd.particle(index), state, "particle {index} of the crowd");
         assert_eq!(in_graph.particle(index), state, "particle {index} of the graph");
         // A free fall of 0.75 s ends 2.8 m lower.
         touching_count += usize::from(state.position[1] > start[1] - 2.0);
