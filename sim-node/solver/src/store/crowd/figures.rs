@@ -56,6 +56,9 @@ pub(crate) fn find_figures(
     order: &ProjectionOrder,
     particles: &[u32],
 ) -> Vec<Figures> {
+    if particles.len() < FIGURES_MIN {
+        return Vec::new();
+    }
     let (figures, numbers) = divide(model, order, particles);
     let mut found: Vec<Figures> = Vec::new();
     let mut known = HashMap::new();
