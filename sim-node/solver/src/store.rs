@@ -1,5 +1,5 @@
-//! The particles and constraints of a scene in the form that a substep uses: sheets in rows, the
-//! rest as a graph. The state is unpacked from the published particles at the start of a step, and
+//! The particles and constraints of a scene in the form that a substep uses: sheets and crowds
+//! in rows, the rest as a graph. The state is unpacked from the published particles at the start of a step, and
 //! packed again at the end.
 
 mod bends;

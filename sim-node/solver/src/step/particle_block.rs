@@ -6,7 +6,7 @@ use super::prediction::Prediction;
 use crate::contacts::path::{LanePath, SubstepPath};
 use crate::kernels::lanes::Wide;
 
-/// Particles side by side: a row of a sheet, or a block of the graph.
+/// Particles side by side: a row of a sheet or a crowd, or a block of the graph.
 pub(crate) trait ParticleBlock {
     /// Number of groups of eight. The last one may have padding, whose inverse mass is 0.
     fn group_count(&self) -> usize;

@@ -1,4 +1,4 @@
-//! The stages of single particles, for rows of sheets and blocks of the graph alike.
+//! The stages of single particles, for rows of sheets and crowds and for blocks of the graph alike.
 
 use super::particle_block::ParticleBlock;
 use super::stage::Stage;

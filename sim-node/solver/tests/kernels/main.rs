@@ -1,5 +1,5 @@
 //! Every kernel and every number of threads gives the bits of the reference, which projects the
-//! constraints one after another and treats sheets as graphs: on every scene, at every size around
+//! constraints one after another and treats sheets and crowds as graphs: on every scene, at every size around
 //! that of a vector, and with every property of a constraint.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
