@@ -1,4 +1,4 @@
-//! The stages that a sheet or the graph runs in a pass.
+//! The stages that a sheet, a crowd or the graph runs in a pass.
 
 use super::stage::Stage;
 use crate::constraints::fields::Pass;

@@ -1,4 +1,4 @@
-//! Particles and constraints outside of sheets: batches of eight constraints that share no particle.
+//! Particles and constraints outside of sheets and crowds: batches of eight constraints that share no particle.
 
 mod batch;
 mod bends;
@@ -38,7 +38,7 @@ use crate::step::stage::Stage;
 use crate::step::substep::SubstepInputs;
 use crate::step::wind::WindStep;
 
-/// Every particle and constraint outside of sheets.
+/// Every particle and constraint outside of sheets and crowds.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Graph {
     /// The particles in groups of eight, with at least one more for the padding of lane groups. Nothing moves
@@ -110,7 +110,7 @@ impl Graph {
         graph
     }
 
-    /// Index of a particle of the scene in the graph, unless it lies in a sheet.
+    /// Index of a particle of the scene in the graph, unless it lies in a sheet or a crowd.
     pub(crate) fn find(&self, particle: u32) -> Option<u32> {
         find_particle(&self.indices, particle)
     }
