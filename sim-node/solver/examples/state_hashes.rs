@@ -4,9 +4,14 @@
 //! Each scene makes 10,000 steps (a larger one 4,000 or 1,000) with commands of every kind. Two builds that
 //! print the same lines compute the same bits, regardless of optimisation. `tests/state_hashes.txt`
 //! has the same lines. It may change only together with the solver's version.
+//!
+//! With a number n as argument, each scene makes 1/n of the steps, with the same commands: without optimisation,
+//! all steps take a quarter of an hour.
 #![allow(clippy::print_stdout, reason = "printing is what it is for")]
 
+use std::env;
 use std::error::Error;
+use std::num::NonZero;
 use std::thread;
 
 use sim_solver::{
@@ -23,7 +28,7 @@ const SCENES: [(&str, &str); 6] = [
     ("stiffness", include_str!("../tests/scenes/stiffness.toml")),
 ];
 
-/// Returns the number of steps. Large scenes make fewer, because a debug build takes minutes.
+/// Returns the number of steps. Large scenes make fewer, because they take longer.
 fn steps(solver: &Solver) -> u32 {
     match solver.particle_count() {
         0..170 => 10_000,
@@ -33,19 +38,26 @@ fn steps(solver: &Solver) -> u32 {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    print!("{}", lines()?);
+    let divisor = match env::args().nth(1) {
+        Some(number) => {
+            number.parse().map_err(|_| format!("expected a number > 0, not {number}"))?
+        }
+        None => NonZero::<u32>::MIN,
+    };
+    print!("{}", lines(divisor)?);
     Ok(())
 }
 
-/// Returns the solver's version, then a line for each scene.
-pub(crate) fn lines() -> Result<String, Box<dyn Error>> {
+/// Returns the solver's version, then a line for each scene. `divisor` divides the numbers of steps, and the steps of
+/// the commands.
+pub(crate) fn lines(divisor: NonZero<u32>) -> Result<String, Box<dyn Error>> {
     let built_in = builtin::names().filter_map(|name| Some((name, builtin::text(name)?)));
     let scenes: Result<Vec<_>, _> =
         built_in.chain(SCENES).map(|(name, text)| Scene::from_toml(text, name)).collect();
     let scenes = scenes?;
-    // All scenes run at the same time, because a debug build takes minutes.
     let hashes: Vec<_> = thread::scope(|scope| {
-        let running: Vec<_> = scenes.iter().map(|scene| scope.spawn(|| run(scene))).collect();
+        let running: Vec<_> =
+            scenes.iter().map(|scene| scope.spawn(move || run(scene, divisor.get()))).collect();
         running.into_iter().map(thread::ScopedJoinHandle::join).collect()
     });
     let mut lines = format!("solver_version {SOLVER_VERSION}\n");
@@ -56,11 +68,11 @@ pub(crate) fn lines() -> Result<String, Box<dyn Error>> {
     Ok(lines)
 }
 
-fn run(scene: &Scene) -> u64 {
+fn run(scene: &Scene, divisor: u32) -> u64 {
     let mut solver = Solver::new(scene);
-    for step in 0..steps(&solver) {
+    for step in 0..steps(&solver) / divisor {
         // A command without meaning in a scene is refused by every build.
-        let _refused = command(&mut solver, step);
+        let _refused = command(&mut solver, divisor * step);
         solver.step();
     }
     solver.state_hash()
