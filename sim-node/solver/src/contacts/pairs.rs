@@ -8,6 +8,7 @@
 //! Where cloths touch as surfaces, a particle and a triangle take the place of most pairs.
 
 mod box_tree;
+mod lane_bounds;
 mod load;
 pub(crate) mod order;
 mod pair;
@@ -40,8 +41,8 @@ const REACH: f32 = 1.1;
 /// half of it. A larger one finds more candidates, a smaller one finds them more often. No bit depends on it unless there
 /// are too many candidates.
 const PARTICLES_MARGIN: f32 = 0.25;
-/// The same where cloths touch as surfaces. There, candidates are found at the start of the paths, so bits depend on it.
-const SURFACES_MARGIN: f32 = 0.4;
+/// The same where cloths touch as surfaces. There, bits depend on when candidates are found, and so on this margin.
+const SURFACES_MARGIN: f32 = 0.3;
 /// Part of the tiles with strays from which on all paths begin anew: a full search is then as fast.
 const STRAY_PART_MAX: f32 = 0.5;
 /// Largest number of candidates for each particle, on average. It bounds the time of a step in which
@@ -67,6 +68,9 @@ pub(crate) struct ParticleContacts {
     loose: Vec<u16>,
     surfaces: SurfaceContacts,
     tree: TileTree,
+    /// By slot, where cloths touch as surfaces: the state on the path for which the candidates were found. Empty in other
+    /// modes.
+    expected: Vec<PackedParticle>,
     /// The paths for which the candidates were found.
     paths: Paths,
     /// Substep in which the paths begin. None before the first one of a step.
@@ -82,6 +86,8 @@ pub(crate) struct ParticleContacts {
     involved: Vec<u32>,
     /// The pairs of the running substep, in the order of contact.
     near: Vec<Pair>,
+    /// By tile: a bit for each particle that the running substep may have pushed.
+    touched: Vec<u32>,
     /// Number of searches that were given up because there were too many candidates.
     pub(crate) overflow_count: u64,
 }
@@ -110,11 +116,13 @@ impl ParticleContacts {
         } else {
             candidate_count_max
         };
+        let states = vec![PackedParticle([f32::NAN; 8]); count.next_multiple_of(TILE)];
         Self {
             thickness,
             margin: margin * thickness,
             locations: vec![Location::default(); count],
-            states: vec![PackedParticle([f32::NAN; 8]); count.next_multiple_of(TILE)],
+            expected: if has_surfaces { states.clone() } else { Vec::new() },
+            states,
             paths: Paths::default(),
             load_pairs: LoadPairs::new(model, &particles, (thickness, kernels), &|tiles| {
                 if has_surfaces { without_corners([0; TILE], &loose, tiles) } else { [0; TILE] }
@@ -129,6 +137,7 @@ impl ParticleContacts {
             candidates: Vec::with_capacity(pair_count_max),
             ordered: Vec::with_capacity(pair_count_max),
             involved: vec![0; count.div_ceil(TILE)],
+            touched: vec![0; count.div_ceil(TILE)],
             near: Vec::with_capacity(pair_count_max),
             overflow_count: 0,
         }
@@ -169,15 +178,13 @@ impl ParticleContacts {
         friction: f32,
     ) {
         self.find_strays(store, substep);
-        let are_on_their_paths = !self.tree.has_stray.contains(&true);
-        if !are_on_their_paths {
-            self.find_candidates(store, substep);
-        }
-        if !self.surfaces.has_candidates() {
-            self.load_involved(store);
-        } else if are_on_their_paths {
+        let has_stray = self.tree.has_stray.contains(&true);
+        let are_loaded = has_stray && self.find_candidates(store, substep);
+        if !are_loaded && self.surfaces.has_candidates() {
             // They may come to other triangles.
             self.load_all(store);
+        } else if !are_loaded {
+            self.load_involved(store);
         }
         let Self { states, ordered, near, surfaces, thickness, .. } = self;
         near.clear();
@@ -185,11 +192,21 @@ impl ParticleContacts {
         for pair in &*near {
             pair.push_apart(states, friction);
         }
-        surfaces.push_apart(states, (*thickness, REACH), friction);
+        surfaces.push_apart(states, (*thickness, REACH), (friction, store.kernels()));
+        self.touched.fill(0);
         let slots = near.iter().flat_map(|pair| pair.slots);
-        for slot in slots.chain(surfaces.touched()) {
-            let PackedParticle([x, y, z, _, dx, dy, dz, _]) = states[slot as usize];
-            store.set_path(self.locations[slot as usize], [x, y, z], [dx, dy, dz]);
+        mark(&mut self.touched, slots.chain(surfaces.touched()));
+        self.save_touched(store);
+    }
+
+    /// Writes the paths of the particles back that may have been pushed, each once.
+    fn save_touched(&self, store: &mut ParticleStore) {
+        for (tile, mut lanes) in self.touched.iter().copied().enumerate() {
+            while let Some(lane) = take_lowest(&mut lanes) {
+                let slot = TILE * tile + lane as usize;
+                let PackedParticle([x, y, z, _, dx, dy, dz, _]) = self.states[slot];
+                store.set_path(self.locations[slot], [x, y, z], [dx, dy, dz]);
+            }
         }
     }
 
@@ -219,14 +236,15 @@ impl ParticleContacts {
         store.mark_strays(&self.paths, Progress { count, limit }, has_stray);
     }
 
-    /// Finds the candidates in tiles with strays for the rest of the step, and orders all.
-    fn find_candidates(&mut self, store: &ParticleStore, substep: Substep) {
+    /// Finds the candidates in tiles with strays for the rest of the step, and orders all. Returns true if it has loaded
+    /// all particles.
+    fn find_candidates(&mut self, store: &ParticleStore, substep: Substep) -> bool {
         let stray_count = self.tree.has_stray.iter().filter(|has_stray| **has_stray).count();
         let are_few = (stray_count as f32) < STRAY_PART_MAX * self.tree.tiles.len() as f32;
-        // Candidates of surfaces walk over the triangles from the beginning of all paths at once. An incomplete search
-        // has left out candidates of tiles without strays.
-        let is_partial = are_few && self.is_complete && !self.surfaces.are_on();
-        let passed = if let Some(begin) = self.paths_begin_at.filter(|_| is_partial) {
+        // An incomplete search has left out candidates of tiles without strays.
+        let is_partial = are_few && self.is_complete;
+        let begin = self.paths_begin_at.filter(|_| is_partial);
+        let passed = if let Some(begin) = begin {
             let passed = (substep.index - begin.index) as f32;
             self.follow_strays(store, passed);
             passed
@@ -241,13 +259,14 @@ impl ParticleContacts {
         let distance = REACH * self.thickness + self.margin;
         let mut is_complete = self.search(Query { times, distance }, kernels).is_continue();
         if self.surfaces.are_on() {
-            let Self { tree, states, particles, .. } = self;
-            let search = SurfaceSearch { tree, states, particles, span, distance, kernels };
+            let Self { tree, expected: states, particles, .. } = self;
+            let search = SurfaceSearch { tree, states, particles, passed, span, distance, kernels };
             is_complete &= self.surfaces.find(&search).is_continue();
         }
         self.is_complete = is_complete;
         self.overflow_count += u64::from(!is_complete);
         self.order_candidates();
+        begin.is_none()
     }
 
     /// Gives all particles new paths, from this substep on.
@@ -257,13 +276,16 @@ impl ParticleContacts {
         self.load_all(store);
         self.tree.has_stray.fill(true);
         self.tree.follow_strays(&self.states, 0.0, store.kernels());
+        if self.surfaces.are_on() {
+            self.expected.copy_from_slice(&self.states);
+        }
         self.candidates.clear();
     }
 
     /// Gives the particles in tiles with strays the paths that they take after this number of displacements, and drops
     /// their candidates. Those of the others still hold.
     fn follow_strays(&mut self, store: &ParticleStore, passed: f32) {
-        let Self { tree, states, candidates, locations, paths, .. } = self;
+        let Self { tree, states, candidates, locations, paths, surfaces, expected, .. } = self;
         for slot in tree.slots_with_strays() {
             states[slot] = store.packed_particle(locations[slot]);
         }
@@ -271,6 +293,9 @@ impl ParticleContacts {
         for slot in tree.slots_with_strays() {
             let path = tree.tiles[slot / TILE].particle(slot % TILE);
             store.set_saved_path(paths, locations[slot], path);
+        }
+        if surfaces.are_on() {
+            tree.place(passed, store.kernels(), expected);
         }
         candidates.retain(|pair| !pair.tiles().iter().any(|tile| tree.has_stray[*tile as usize]));
     }
@@ -332,9 +357,14 @@ impl ParticleContacts {
     fn order_candidates(&mut self) {
         order_by_key(&self.candidates, &mut self.ordered, |pair| pair.key);
         self.involved.fill(0);
-        for slot in self.candidates.iter().flat_map(|pair| pair.slots) {
-            self.involved[slot as usize / TILE] |= 1 << (slot as usize % TILE);
-        }
+        mark(&mut self.involved, self.candidates.iter().flat_map(|pair| pair.slots));
+    }
+}
+
+/// Sets the bits of slots, by tile.
+fn mark(tiles: &mut [u32], slots: impl Iterator<Item = u32>) {
+    for slot in slots {
+        tiles[(slot / TILE_LENGTH) as usize] |= 1 << (slot % TILE_LENGTH);
     }
 }
 

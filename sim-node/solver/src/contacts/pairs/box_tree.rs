@@ -106,15 +106,19 @@ impl BoxTree {
         }
     }
 
-    /// Passes every pair of a leaf of this tree and one of the other tree that are near each other to `accept`.
+    /// Passes every pair of a leaf of this tree and one of the other tree that are near each other, at least one of them
+    /// marked, to `accept`.
     pub(super) fn search_between(
         &self,
         other: &Self,
-        distance: f32,
+        (distance, kernels): (f32, Kernels),
         accept: &mut impl FnMut([u32; 2]) -> Search,
     ) -> Search {
         match (self.root(), other.root()) {
-            (Some(a), Some(b)) => self.search_nodes_between(other, [a, b], distance, accept),
+            (Some(a), Some(b)) => {
+                let trees = [self, other];
+                kernels.run(SearchBetween { trees, roots: [a, b], distance, accept })
+            }
             _ => Search::Continue(()),
         }
     }
@@ -140,31 +144,12 @@ impl BoxTree {
         let end = self.levels[level].len().min(ARITY * (node.index + 1));
         (ARITY * node.index..end).map(move |index| Node { level, index })
     }
+}
 
-    fn search_nodes_between(
-        &self,
-        other: &Self,
-        [a, b]: [Node; 2],
-        distance: f32,
-        accept: &mut impl FnMut([u32; 2]) -> Search,
-    ) -> Search {
-        if !self.bounds(a).are_near(other.bounds(b), distance) {
-            return Search::Continue(());
-        }
-        if a.level == 0 && b.level == 0 {
-            return accept([a, b].map(Node::leaf));
-        }
-        if a.level >= b.level {
-            for child in self.children(a) {
-                self.search_nodes_between(other, [child, b], distance, accept)?;
-            }
-        } else {
-            for child in other.children(b) {
-                self.search_nodes_between(other, [a, child], distance, accept)?;
-            }
-        }
-        Search::Continue(())
-    }
+/// Pairs of nodes that are near each other. Later pairs lie deeper. A level has at most 16, or 4 in each of two trees.
+struct Stack {
+    pairs: [[Node; 2]; LEVELS_MAX * ARITY * ARITY],
+    length: usize,
 }
 
 /// Finds the pairs of leaves of a tree that are near each other, depth first.
@@ -175,10 +160,33 @@ struct PairSearch<'a, F> {
     accept: &'a mut F,
 }
 
-/// Pairs of nodes of one level that are near each other, the first one not behind the second. Later pairs lie deeper.
-struct Stack {
-    pairs: [[Node; 2]; LEVELS_MAX * ARITY * ARITY],
-    length: usize,
+/// Finds the pairs of leaves of two trees that are near each other, depth first.
+struct SearchBetween<'a, F> {
+    trees: [&'a BoxTree; 2],
+    roots: [Node; 2],
+    distance: f32,
+    accept: &'a mut F,
+}
+
+impl<F: FnMut([u32; 2]) -> Search> LaneWork for SearchBetween<'_, F> {
+    type Output = Search;
+
+    #[inline(always)]
+    fn run<W: Wide>(self) -> Search {
+        let Self { trees, roots, distance, accept } = self;
+        let mut stack = Stack { pairs: [roots; LEVELS_MAX * ARITY * ARITY], length: 1 };
+        while stack.length > 0 {
+            stack.length -= 1;
+            let pair = stack.pairs[stack.length];
+            if pair[0].level == 0 && pair[1].level == 0 {
+                accept(pair.map(Node::leaf))?;
+            } else {
+                let parent = usize::from(pair[0].level < pair[1].level);
+                stack.push_children_of::<W>(trees, pair, (parent, distance));
+            }
+        }
+        Search::Continue(())
+    }
 }
 
 impl<F: FnMut([u32; 2]) -> Search> LaneWork for PairSearch<'_, F> {
@@ -218,6 +226,30 @@ impl Stack {
                     self.pairs[self.length] = [left, right];
                     self.length += 1;
                 }
+            }
+        }
+    }
+
+    /// Replaces one node of a pair, `parent`, by those of its children that are near the other one.
+    #[inline(always)]
+    fn push_children_of<W: Wide>(
+        &mut self,
+        trees: [&BoxTree; 2],
+        pair: [Node; 2],
+        (parent, distance): (usize, f32),
+    ) {
+        let d = distance;
+        let moved_out = W::load(&[0.0, 0.0, 0.0, 0.0, d, d, d, 0.0], 0);
+        let (tree, other_tree, other) = (trees[parent], trees[1 - parent], pair[1 - parent]);
+        let facing = W::load(&facing_sides(other_tree.bounds(other), distance), 0);
+        let is_marked = other_tree.is_marked(other);
+        for child in tree.children(pair[parent]).rev() {
+            let sides = &tree.sides[child.level][child.index];
+            if (is_marked | tree.is_marked(child)) && sides.are_near(facing, moved_out) {
+                let mut near = pair;
+                near[parent] = child;
+                self.pairs[self.length] = near;
+                self.length += 1;
             }
         }
     }
@@ -299,6 +331,38 @@ mod tests {
             let has_mark = |pair: &[u32; 2]| pair.iter().any(|leaf| is_marked[*leaf as usize]);
             let marked: Vec<_> = all.into_iter().filter(has_mark).collect();
             assert_eq!(found(&tree, kernels), marked, "{kernels:?}");
+        }
+    }
+
+    #[test]
+    fn a_search_between_trees_finds_all_near_pairs_with_a_mark() {
+        let (long, short) = (4_u32.pow(3) + 37, 29);
+        let (mut left, mut right) = (tree(long as usize), tree(short as usize));
+        let near = |[a, b]: [u32; 2]| match [a + 1 == long, b + 1 == short] {
+            [false, false] => a.abs_diff(b) <= 6,
+            alone => alone == [true; 2],
+        };
+        for kernels in Kernels::available() {
+            for marks in [[1, 1], [7, 1000], [1000, 5], [1000, 1000]] {
+                let [in_left, in_right] =
+                    [(long, marks[0]), (short, marks[1])].map(|(count, every)| {
+                        (0..count).map(|leaf| leaf % every == 3 % every).collect::<Vec<_>>()
+                    });
+                left.mark(&in_left);
+                right.mark(&in_right);
+                let mut found = Vec::new();
+                let search = left.search_between(&right, (0.0, kernels), &mut |pair| {
+                    found.push(pair);
+                    Search::Continue(())
+                });
+                assert!(search.is_continue());
+                found.sort_unstable();
+                let has_mark = |[a, b]: [u32; 2]| in_left[a as usize] || in_right[b as usize];
+                let pairs = (0..long).flat_map(|a| (0..short).map(move |b| [a, b]));
+                let expected: Vec<_> =
+                    pairs.filter(|pair| near(*pair) && has_mark(*pair)).collect();
+                assert_eq!(found, expected, "{kernels:?}, {marks:?}");
+            }
         }
     }
 }

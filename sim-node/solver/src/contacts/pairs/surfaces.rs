@@ -5,9 +5,11 @@
 //! move on across edges and around corners, so that a particle slides over the triangles without feeling them.
 
 mod contact;
+mod faces;
 mod nearest;
 mod placed_tile;
 mod surface;
+mod triangle_tile;
 mod triangle_tiles;
 
 use glam::Vec3;
@@ -15,16 +17,18 @@ use glam::Vec3;
 use super::box_tree::Search;
 use super::load::{self, LoadPairs};
 use super::order::{order_by_key, order_key};
+use super::tile::{TILE, TILE_LENGTH};
 use super::tile_tree::TileTree;
 use crate::kernels::Kernels;
-use crate::kernels::lanes::PackedParticle;
+use crate::kernels::lanes::{LaneWork, PackedParticle, Wide};
 use crate::scene::model::Model;
 use crate::state::tear::Torn;
 use contact::SurfaceContact;
+use faces::Faces;
 use nearest::{Feature, Nearest};
 use surface::{Found, Surface, View};
 pub(super) use triangle_tiles::SurfaceSearch;
-use triangle_tiles::TriangleTiles;
+use triangle_tiles::{TriangleTiles, Wanted};
 
 /// Largest number of triangles that a particle never touches, on average. Further ones touch it as all others.
 const NEVER_PER_PARTICLE: usize = 128;
@@ -57,6 +61,8 @@ struct Candidate {
     /// The candidate of this particle that was found before.
     previous: Option<u32>,
     key: u8,
+    /// True if the particle has come to a triangle that it never touches.
+    never_touches: bool,
 }
 
 impl SurfaceContacts {
@@ -68,13 +74,14 @@ impl SurfaceContacts {
         candidate_count_max: usize,
     ) -> Self {
         let surface = Surface::new(model, particles, load::triangles(model, particles));
-        let mut tiles = TriangleTiles::new(surface.corners.len());
+        let mut tiles = TriangleTiles::new(&surface);
         let tree = TileTree::at_load(model, particles, kernels);
         let states: Vec<_> = particles.iter().map(|one| at_load(model, *one)).collect();
         let search = SurfaceSearch {
             tree: &tree,
             states: &states,
             particles,
+            passed: 0.0,
             span: 0.0,
             distance: load::CONNECTED_REACH * thickness,
             kernels,
@@ -116,38 +123,66 @@ impl SurfaceContacts {
         self.near.iter().flat_map(|contact| contact.slots)
     }
 
-    /// Finds the candidates, and orders them. Breaks if there are too many.
+    /// Finds the candidates in tiles with strays, and orders all. Breaks if there are too many.
     pub(super) fn find(&mut self, search: &SurfaceSearch<'_>) -> Search {
+        self.tiles.refit(&self.surface, search);
+        self.keep_candidates(search);
         let Self { surface, tiles, load_pairs, candidates, newest, .. } = self;
         let (particles, count_max) = (search.particles, self.candidate_count_max);
-        candidates.clear();
-        newest.fill(None);
-        tiles.refit(surface, search);
         let mut accept = |[slot, triangle]: [u32; 2]| {
             let Some(feature) = near_feature(surface, search, [slot, triangle]) else {
                 return Search::Continue(());
             };
             // Triangles that share the nearest point are one candidate.
+            let is_known = has_candidate(candidates, newest[slot as usize], |known| {
+                !known.never_touches && surface.shares(triangle, feature, known.triangle)
+            });
+            if is_known {
+                return Search::Continue(());
+            }
             let triangle = surface.first_sharing(triangle, feature, |one| {
                 !surface.has_corner(one, slot) && !load_pairs.never_touch(slot, one)
             });
-            if has_candidate(candidates, newest[slot as usize], triangle) {
-                return Search::Continue(());
-            }
             if candidates.len() == count_max {
                 return Search::Break(());
             }
             let first = surface.corners[triangle as usize][0];
             let key = order_key(particles[slot as usize], particles[first as usize]);
-            #[allow(clippy::cast_possible_truncation, reason = "at most 8 for each particle")]
-            let previous = newest[slot as usize].replace(candidates.len() as u32);
-            candidates.push(Candidate { slot, triangle, previous, key });
+            let candidate = Candidate { slot, triangle, previous: None, key, never_touches: false };
+            enter(candidates, newest, candidate);
             Search::Continue(())
         };
         let except = |tiles| load_pairs.untouchable(tiles);
-        let found = tiles.search_nearest(search, surface, &except, &mut accept);
+        let wanted = Wanted::Nearest;
+        let found = tiles.search((surface, wanted), search, &except, &mut accept);
         order_by_key(&self.candidates, &mut self.ordered, |candidate| candidate.key);
         found
+    }
+
+    /// Keeps the candidates whose particle and triangle are in tiles without strays. The search finds the others.
+    ///
+    /// The triangle is the one on the paths, as in the search: where the particle is now, it may be another one, and so
+    /// in a tile that the search leaves out, or finds again.
+    fn keep_candidates(&mut self, search: &SurfaceSearch<'_>) {
+        let Self { surface, tiles, load_pairs, candidates, newest, ordered, .. } = self;
+        candidates.clear();
+        newest.fill(None);
+        for candidate in ordered.iter() {
+            let slot = candidate.slot;
+            if search.tree.has_stray[(slot / TILE_LENGTH) as usize] {
+                continue;
+            }
+            let view = View { particles: search.states, slot, time: 0.0 };
+            let Found { triangle, nearest, .. } = surface.descend(candidate.triangle, view);
+            let is_known = has_candidate(candidates, newest[slot as usize], |known| {
+                !known.never_touches && surface.shares(triangle, nearest.feature, known.triangle)
+            });
+            if !is_known && !tiles.has_stray_near(triangle) {
+                let never_touches = load_pairs.never_touch(slot, triangle);
+                let kept = Candidate { triangle, never_touches, ..*candidate };
+                enter(candidates, newest, kept);
+            }
+        }
     }
 
     /// Pushes particles and triangles apart that are nearer than `thickness` at the end of the substep.
@@ -155,29 +190,98 @@ impl SurfaceContacts {
         &mut self,
         states: &mut [PackedParticle],
         (thickness, reach): (f32, f32),
-        friction: f32,
+        (friction, kernels): (f32, Kernels),
     ) {
         let Self { surface, load_pairs, ordered, near, .. } = self;
         near.clear();
-        for Candidate { slot, triangle, .. } in ordered {
-            let view = View { particles: states, slot: *slot, time: 1.0 };
-            let found = surface.descend(*triangle, view);
-            *triangle = found.triangle;
-            if load_pairs.never_touch(*slot, *triangle) {
-                continue;
-            }
-            let distance = load_pairs.distance([*slot, *triangle], thickness);
-            let (normal, height) = separation(surface, &found, view);
-            // False for NaN.
-            if height < reach * distance {
-                let [a, b, c] = surface.corners[*triangle as usize];
-                let weights = found.nearest.weights;
-                near.push(SurfaceContact { slots: [*slot, a, b, c], weights, normal, distance });
-            }
-        }
+        let touching = Touching { surface, load_pairs, states, thickness, reach };
+        kernels.run(TouchWork { touching, candidates: ordered, near });
         for contact in &*near {
             contact.push_apart(states, friction);
         }
+    }
+}
+
+/// Finds the candidates that are near at the end of the substep, and moves them on to the nearest triangles.
+struct TouchWork<'a> {
+    touching: Touching<'a>,
+    candidates: &'a mut [Candidate],
+    near: &'a mut Vec<SurfaceContact>,
+}
+
+impl LaneWork for TouchWork<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<W: Wide>(self) {
+        let Self { touching, candidates, near } = self;
+        let mut faces = Faces::default();
+        let (groups, rest) = candidates.as_chunks_mut::<8>();
+        for group in groups {
+            let (mut slots, mut triangles) = ([0; 8], [0; 8]);
+            for (lane, candidate) in group.iter().enumerate() {
+                (slots[lane], triangles[lane]) = (candidate.slot, candidate.triangle);
+            }
+            faces.find::<W>(touching.surface, touching.states, (slots, triangles));
+            for (lane, candidate) in group.iter_mut().enumerate() {
+                near.extend(if faces.lanes & (1 << lane) != 0 {
+                    touching.on_face(candidate, &faces, lane)
+                } else {
+                    touching.anywhere(candidate)
+                });
+            }
+        }
+        near.extend(rest.iter_mut().filter_map(|candidate| touching.anywhere(candidate)));
+    }
+}
+
+/// The conditions under which candidates touch.
+struct Touching<'a> {
+    surface: &'a Surface,
+    load_pairs: &'a LoadPairs,
+    states: &'a [PackedParticle],
+    /// Contact distance of all that are not near at load.
+    thickness: f32,
+    /// Candidates within this number of contact distances touch.
+    reach: f32,
+}
+
+impl Touching<'_> {
+    /// Returns the contact of a candidate whose nearest point is on the face of its triangle.
+    #[inline(always)]
+    fn on_face(&self, candidate: &Candidate, faces: &Faces, lane: usize) -> Option<SurfaceContact> {
+        let (weights, normal) = faces.lane(lane);
+        let found = (Vec3::from_array(normal), faces.heights[lane]);
+        self.contact(candidate, weights, found)
+    }
+
+    /// Moves a candidate on to the nearest triangle, and returns its contact.
+    #[inline(never)]
+    fn anywhere(&self, candidate: &mut Candidate) -> Option<SurfaceContact> {
+        let Candidate { slot, triangle, .. } = *candidate;
+        let view = View { particles: self.states, slot, time: 1.0 };
+        let found = self.surface.descend(triangle, view);
+        if found.triangle != triangle {
+            candidate.triangle = found.triangle;
+            candidate.never_touches = self.load_pairs.never_touch(slot, found.triangle);
+        }
+        self.contact(candidate, found.nearest.weights, separation(self.surface, &found, view))
+    }
+
+    #[inline(always)]
+    fn contact(
+        &self,
+        candidate: &Candidate,
+        weights: [f32; 3],
+        (normal, height): (Vec3, f32),
+    ) -> Option<SurfaceContact> {
+        let Candidate { slot, triangle, never_touches, .. } = *candidate;
+        let distance = self.load_pairs.distance([slot, triangle], self.thickness);
+        // False for NaN.
+        let is_near = height < self.reach * distance && !never_touches;
+        let [a, b, c] = self.surface.corners[triangle as usize];
+        let slots = [slot, a, b, c];
+        is_near.then_some(SurfaceContact { slots, weights, normal, distance })
     }
 }
 
@@ -204,11 +308,24 @@ fn across([a, b, c]: [Vec3; 3]) -> Vec3 {
     (b - a).cross(c - a)
 }
 
-/// True if a triangle is one of the candidates of a particle, of which the newest is given.
-fn has_candidate(candidates: &[Candidate], newest: Option<u32>, triangle: u32) -> bool {
+/// Adds a candidate, and links it to the one of its particle that was added before.
+#[inline(always)]
+fn enter(candidates: &mut Vec<Candidate>, newest: &mut [Option<u32>], candidate: Candidate) {
+    #[allow(clippy::cast_possible_truncation, reason = "at most 8 for each particle")]
+    let index = candidates.len() as u32;
+    let previous = newest[candidate.slot as usize].replace(index);
+    candidates.push(Candidate { previous, ..candidate });
+}
+
+/// True if one of the candidates of a particle, of which the newest is given, fulfils a condition.
+fn has_candidate(
+    candidates: &[Candidate],
+    newest: Option<u32>,
+    condition: impl Fn(&Candidate) -> bool,
+) -> bool {
     let mut at = newest;
     while let Some(candidate) = at.map(|index| &candidates[index as usize]) {
-        if candidate.triangle == triangle {
+        if condition(candidate) {
             return true;
         }
         at = candidate.previous;
@@ -261,7 +378,7 @@ fn near_at_load(
     let count_max = NEVER_PER_PARTICLE * particles.len();
     let (mut never, mut closer) = (Vec::new(), Vec::new());
     tiles.refit(surface, search);
-    let _is_complete = tiles.search(search, &mut |pair| {
+    let _is_complete = tiles.search((surface, Wanted::All), search, &|_| [0; TILE], &mut |pair| {
         let [slot, triangle] = pair;
         let corners = surface.place(triangle, View { particles: states, slot, time: 0.0 });
         let apart = Nearest::new(corners).mean(corners).length();

@@ -1,14 +1,15 @@
 //! Tiles of sixteen particles with their straight paths.
 
+use super::lane_bounds::LaneBounds;
 use crate::contacts::bounds::Bounds;
-use crate::kernels::lanes::{Lanes8, PackedParticle, Wide, axes, map_axes};
+use crate::kernels::lanes::{Lanes8, PackedParticle, Wide, axes};
 
 /// Number of particles in a tile: two groups of eight lanes.
 pub(super) const TILE: usize = TILE_LENGTH as usize;
 /// The same number for slots.
 pub(super) const TILE_LENGTH: u32 = 16;
-/// A number for each particle of a tile.
-type TileColumn = [Lanes8; TILE / 8];
+/// A number for each entry of a tile.
+pub(super) type TileColumn = [Lanes8; TILE / 8];
 
 /// The particles of a tile: positions, and displacements in a substep. The padding is NaN, which is near
 /// nothing.
@@ -61,18 +62,15 @@ impl Tile {
         }
     }
 
-    /// Returns a bit for each particle that is in a box after `time` displacements.
+    /// Replaces states by those on the paths after `time` displacements. Masses stay.
     #[inline(always)]
-    pub(super) fn lanes_in_box<W: Wide>(&self, time: f32, bounds: &Bounds) -> u32 {
-        let mut bits = 0;
-        for (group, at) in self.positions::<W>(time).into_iter().enumerate() {
-            let [x, y, z] = at;
-            let x = is_within(x, bounds.min[0], bounds.max[0]);
-            let y = is_within(y, bounds.min[1], bounds.max[1]);
-            let z = is_within(z, bounds.min[2], bounds.max[2]);
-            bits |= W::bits(W::both(x, W::both(y, z))) << (8 * group);
+    pub(super) fn place<W: Wide>(&self, time: f32, states: &mut [PackedParticle; TILE]) {
+        let positions = self.positions::<W>(time);
+        let (groups, _) = states.as_chunks_mut();
+        for (group, (states, positions)) in groups.iter_mut().zip(positions).enumerate() {
+            W::set_positions(states, positions);
+            W::set_displacements(states, axes(|axis| W::load(&self.d[axis][group], 0)));
         }
-        bits
     }
 
     /// Position and displacement of a particle.
@@ -95,41 +93,45 @@ impl Tile {
     }
 }
 
+/// Returns a bit for each particle of a tile that is in a box. `positions` has them by group and axis.
+#[inline(always)]
+pub(super) fn lanes_in_box<W: Wide>(positions: &[[W; 3]; TILE / 8], bounds: &Bounds) -> u32 {
+    let mut bits = 0;
+    for (group, [x, y, z]) in positions.iter().enumerate() {
+        let x = is_within(*x, bounds.min[0], bounds.max[0]);
+        let y = is_within(*y, bounds.min[1], bounds.max[1]);
+        let z = is_within(*z, bounds.min[2], bounds.max[2]);
+        bits |= W::bits(W::both(x, W::both(y, z))) << (8 * group);
+    }
+    bits
+}
+
 #[inline(always)]
 fn is_within<W: Wide>(at: W, min: f32, max: f32) -> W::Mask {
     W::both(at.is_at_most(W::splat(max)), W::splat(min).is_at_most(at))
 }
 
+/// The coordinates of the particles of a tile, by axis, from those by group and axis.
+#[inline(always)]
+pub(super) fn coordinates<W: Wide>(positions: &[[W; 3]; TILE / 8]) -> [[f32; TILE]; 3] {
+    let mut coordinates = [[0.0; TILE]; 3];
+    for (group, position) in positions.iter().enumerate() {
+        for axis in 0..3 {
+            let (lanes, _) = coordinates[axis].as_chunks_mut();
+            position[axis].store(&mut lanes[group], 0);
+        }
+    }
+    coordinates
+}
+
 /// The box around points. NaN is left out.
 #[inline(always)]
 fn bounds_of<W: Wide>([x, y, z]: &[TileColumn; 3]) -> Bounds {
-    let [(x_low, x_high), (y_low, y_high), (z_low, z_high)] =
-        [highest::<W>(x), highest::<W>(y), highest::<W>(z)];
-    let max = greatest([x_high, y_high, z_high]);
-    let min = greatest([x_low, y_low, z_low]);
-    Bounds { min: map_axes(min, |axis| -axis), max }
-}
-
-/// By lane, the largest of the negated numbers, and the largest of the numbers.
-#[inline(always)]
-fn highest<W: Wide>([first, second]: &TileColumn) -> (W, W) {
-    let least = W::splat(f32::NEG_INFINITY);
-    let (first, second) = (W::load(first, 0), W::load(second, 0));
-    // NaN leaves the right-hand side.
-    let low = (-second).max_or_rhs((-first).max_or_rhs(least));
-    let high = second.max_or_rhs(first.max_or_rhs(least));
-    (low, high)
-}
-
-/// The largest lane of each.
-#[inline(always)]
-fn greatest<W: Wide>([x, y, z]: [W; 3]) -> [f32; 3] {
-    let larger = |[a, b]: [W; 2]| a.max_or_rhs(b);
-    // Of pairs, then of fours: x, y, z, z and the same of the second four.
-    let of_fours = larger(W::unzip(larger(W::unzip(x, y)), larger(W::unzip(z, z))));
-    let mut lanes = [0.0; 8];
-    of_fours.store(&mut lanes, 0);
-    axes(|axis| if lanes[axis] > lanes[axis + 4] { lanes[axis] } else { lanes[axis + 4] })
+    let mut bounds = LaneBounds::<W>::empty();
+    for group in 0..TILE / 8 {
+        bounds.include([W::load(&x[group], 0), W::load(&y[group], 0), W::load(&z[group], 0)]);
+    }
+    bounds.around_all()
 }
 
 /// Removes the lowest bit that is set, and returns its place.

@@ -4,7 +4,7 @@
 //! to load: only the boxes follow the particles.
 
 use super::box_tree::{BoxTree, Search};
-use super::tile::{TILE, TILE_LENGTH, Tile, take_lowest};
+use super::tile::{TILE, TILE_LENGTH, Tile, coordinates, take_lowest};
 use crate::contacts::bounds::Bounds;
 use crate::kernels::Kernels;
 use crate::kernels::lanes::{LaneWork, PackedParticle, Wide, axes};
@@ -65,6 +65,12 @@ impl TileTree {
         let (states, _) = states.as_chunks();
         let Self { tiles, has_stray, .. } = self;
         kernels.run(FollowWork { tiles, states, time, has_stray });
+    }
+
+    /// Replaces states by those on the paths after `time` displacements. Masses stay.
+    pub(super) fn place(&self, time: f32, kernels: Kernels, states: &mut [PackedParticle]) {
+        let (states, _) = states.as_chunks_mut();
+        kernels.run(PlaceWork { tiles: &self.tiles, time, states });
     }
 
     /// Recomputes the boxes of tiles with strays for a part of the paths: from and to these numbers of displacements.
@@ -139,6 +145,24 @@ impl LaneWork for FollowWork<'_> {
             if *has_stray {
                 tile.follow::<W>(states, self.time);
             }
+        }
+    }
+}
+
+/// Places the particles of tiles on their paths.
+struct PlaceWork<'a> {
+    tiles: &'a [Tile],
+    time: f32,
+    states: &'a mut [[PackedParticle; TILE]],
+}
+
+impl LaneWork for PlaceWork<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<W: Wide>(self) {
+        for (tile, states) in self.tiles.iter().zip(self.states) {
+            tile.place::<W>(self.time, states);
         }
     }
 }
@@ -242,13 +266,7 @@ impl<'a, W: Wide> TilePair<'a, W> {
         let [from, to] = query.times;
         let middle_time = 0.5 * (from + to);
         let distance = query.distance + 0.5 * (to - from) * a.distance_max(b);
-        let mut left = [[0.0; TILE]; 3];
-        for (group, middle) in tiles[0].positions::<W>(middle_time).into_iter().enumerate() {
-            for axis in 0..3 {
-                let (lanes, _) = left[axis].as_chunks_mut();
-                middle[axis].store(&mut lanes[group], 0);
-            }
-        }
+        let left = coordinates(&tiles[0].positions::<W>(middle_time));
         Self { tiles, query, distance, left, right: tiles[1].positions(middle_time) }
     }
 

@@ -2,6 +2,9 @@
 
 use glam::Vec3;
 
+use crate::kernels::lanes::Lanes;
+use crate::kernels::vectors::{difference, dot, scaled};
+
 /// Part of a triangle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Feature {
@@ -93,17 +96,17 @@ pub(super) const SIDE_TOLERANCE: f32 = 1e-5;
 /// True if the origin is on the side of an edge on which a corner lies, in the plane of the three.
 #[inline(always)]
 pub(super) fn is_on_side_of([from, to]: [Vec3; 2], corner: Vec3) -> bool {
-    let inwards = inwards([from, to], corner);
+    let inwards = inwards([from, to].map(|end| end.to_array()), corner.to_array());
     let square = (to - from).dot(to - from);
-    -from.dot(inwards) > SIDE_TOLERANCE * square * square
+    -from.dot(Vec3::from_array(inwards)) > SIDE_TOLERANCE * square * square
 }
 
 /// A vector across an edge to the side of a corner, in the plane of the three: the part of the line to the corner
-/// across the edge, times the square of the edge's length.
+/// across the edge, times the square of the edge's length. 0 if the corner is the start of the edge.
 #[inline(always)]
-pub(super) fn inwards([from, to]: [Vec3; 2], corner: Vec3) -> Vec3 {
-    let (edge, side) = (to - from, corner - from);
-    side * edge.dot(edge) - edge * side.dot(edge)
+pub(super) fn inwards<L: Lanes>([from, to]: [[L; 3]; 2], corner: [L; 3]) -> [L; 3] {
+    let (edge, side) = (difference(to, from), difference(corner, from));
+    difference(scaled(side, dot(edge, edge)), scaled(edge, dot(side, edge)))
 }
 
 #[cfg(test)]

@@ -1,14 +1,12 @@
 //! The triangles of a tile where they are now, to tell which have a point nearest to a particle.
 
-use glam::Vec3;
-
-use super::super::tile::TILE;
+use super::super::tile::{TILE, TileColumn};
 use super::nearest::{SIDE_TOLERANCE, inwards, next};
 use super::surface::Surface;
-use crate::kernels::lanes::{Lanes8, PackedParticle, Wide};
+use super::triangle_tile::gather;
+use crate::kernels::lanes::{PackedParticle, Wide};
+use crate::kernels::vectors::{difference, dot};
 
-/// A number for each triangle of a tile.
-type TileColumn = [Lanes8; TILE / 8];
 /// A vector for each triangle of a tile, by axis.
 type TileVectors = [TileColumn; 3];
 
@@ -27,7 +25,7 @@ struct Edges {
     from: TileVectors,
     /// Vector across the edge, in the plane of the triangle, to its inside.
     inwards: TileVectors,
-    /// The same of the other triangle at the edge; 0 at a border.
+    /// The same of the other triangle at the edge. 0 at a border.
     neighbor_inwards: TileVectors,
     /// Product with `neighbor_inwards` from which a particle is on the side of the other triangle.
     tolerance: TileColumn,
@@ -40,36 +38,34 @@ impl PlacedTile {
 
     /// Computes the edges of the triangles from `first` on, unless they are known.
     #[inline(always)]
-    pub(super) fn place_if_clear(
+    pub(super) fn place_if_clear<W: Wide>(
         &mut self,
         surface: &Surface,
         first: u32,
-        particles: &[PackedParticle],
+        states: &[PackedParticle],
     ) {
         if !std::mem::replace(&mut self.is_placed, true) {
-            self.place(surface, first, particles);
+            self.place::<W>(surface, first, states);
         }
     }
 
-    #[inline(never)]
-    fn place(&mut self, surface: &Surface, first: u32, particles: &[PackedParticle]) {
-        let at = |slot: u32| {
-            let PackedParticle([x, y, z, ..]) = particles[slot as usize];
-            Vec3::new(x, y, z)
-        };
-        let rest = surface.corners[first as usize..].iter().take(TILE);
-        for (lane, (triangle, slots)) in (first..).zip(rest).enumerate() {
-            let corners = slots.map(at);
-            for edge in 0..3 {
+    #[inline(always)]
+    fn place<W: Wide>(&mut self, surface: &Surface, first: u32, states: &[PackedParticle]) {
+        let first = first as usize;
+        let end = surface.corners.len().min(first + TILE);
+        for (group, from) in (first..end).step_by(8).enumerate() {
+            let triangles = from..end.min(from + 8);
+            let slots = &surface.corners[triangles.clone()];
+            // In a closure, the loads would be compiled for the baseline processor.
+            let corners = [
+                positions::<W>(states, slots.iter().map(|slots| slots[0])),
+                positions::<W>(states, slots.iter().map(|slots| slots[1])),
+                positions::<W>(states, slots.iter().map(|slots| slots[2])),
+            ];
+            for (edge, edges) in self.edges.iter_mut().enumerate() {
+                let opposites = triangles.clone().map(|triangle| surface.opposite(triangle, edge));
                 let ends = [corners[edge], corners[next(edge)]];
-                let square = (ends[1] - ends[0]).length_squared();
-                let across = |corner: Vec3| inwards(ends, corner);
-                let opposite = surface.neighbor(triangle, edge).map(|other| at(other.opposite));
-                let edges = &mut self.edges[edge];
-                set(&mut edges.from, lane, ends[0]);
-                set(&mut edges.inwards, lane, across(corners[next(next(edge))]));
-                set(&mut edges.neighbor_inwards, lane, opposite.map_or(Vec3::ZERO, across));
-                edges.tolerance[lane / 8][lane % 8] = SIDE_TOLERANCE * square * square;
+                edges.set(group, ends, corners[next(next(edge))], positions(states, opposites));
             }
         }
     }
@@ -106,6 +102,19 @@ struct Sides {
 }
 
 impl Edges {
+    /// Replaces a group of edges. `corner` is that of the triangle behind the ends, and `opposite` that of the other
+    /// triangle.
+    #[inline(always)]
+    fn set<W: Wide>(&mut self, group: usize, ends: [[W; 3]; 2], corner: [W; 3], opposite: [W; 3]) {
+        let edge = difference(ends[1], ends[0]);
+        let square = dot(edge, edge);
+        set(&mut self.from, group, ends[0]);
+        set(&mut self.inwards, group, inwards(ends, corner));
+        set(&mut self.neighbor_inwards, group, inwards(ends, opposite));
+        let tolerance = W::splat(SIDE_TOLERANCE) * square * square;
+        tolerance.store(&mut self.tolerance[group], 0);
+    }
+
     #[inline(always)]
     fn sides<W: Wide>(&self, group: usize, point: [f32; 3]) -> Sides {
         let (mut inside, mut neighbor_side) = (W::splat(0.0), W::splat(0.0));
@@ -120,8 +129,16 @@ impl Edges {
     }
 }
 
-fn set(vectors: &mut TileVectors, lane: usize, vector: Vec3) {
-    for (axis, column) in vectors.iter_mut().enumerate() {
-        column[lane / 8][lane % 8] = vector[axis];
+#[inline(always)]
+fn set<W: Wide>(vectors: &mut TileVectors, group: usize, vector: [W; 3]) {
+    for axis in 0..3 {
+        vector[axis].store(&mut vectors[axis][group], 0);
     }
+}
+
+/// Where eight particles are.
+#[inline(always)]
+fn positions<W: Wide>(states: &[PackedParticle], slots: impl Iterator<Item = u32>) -> [W; 3] {
+    let [[x, y, z, _], _] = W::columns(&gather(states, slots));
+    [x, y, z]
 }

@@ -133,6 +133,15 @@ impl Surface {
         self.across[triangle as usize][edge].filter(|other| self.is_whole(other.triangle))
     }
 
+    /// Slot of the corner of the other triangle at an edge, which is not on the edge. Where there is none, the slot at
+    /// which the edge starts.
+    #[inline(always)]
+    pub(super) fn opposite(&self, triangle: usize, edge: usize) -> u32 {
+        #[allow(clippy::cast_possible_truncation, reason = "at most 2^24 triangles")]
+        let neighbor = self.neighbor(triangle as u32, edge);
+        neighbor.map_or(self.corners[triangle][edge], |neighbor| neighbor.opposite)
+    }
+
     /// Returns a triangle around the nearest point of this one that leads nearer to the viewer, or `None` if the
     /// point is a local minimum of the distance.
     pub(super) fn nearer(&self, triangle: u32, nearest: &Nearest, view: View<'_>) -> Option<u32> {
@@ -178,6 +187,20 @@ impl Surface {
             }
         };
         first.unwrap_or(triangle)
+    }
+
+    /// True if `other` is a triangle, or has its nearest point, too.
+    pub(super) fn shares(&self, triangle: u32, feature: Feature, other: u32) -> bool {
+        match feature {
+            Feature::Face => other == triangle,
+            Feature::Edge(edge) => {
+                let neighbor = self.neighbor(triangle, edge);
+                other == triangle || neighbor.is_some_and(|one| one.triangle == other)
+            }
+            Feature::Corner(corner) => {
+                self.has_corner(other, self.corners[triangle as usize][corner])
+            }
+        }
     }
 
     /// Goes from a triangle to the one that is nearest to the viewer, across edges and around corners, as long as each is
