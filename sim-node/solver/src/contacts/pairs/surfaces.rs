@@ -4,15 +4,15 @@
 //! the triangles. These points are found for the paths that the particles are about to take. In each substep they
 //! move on across edges and around corners, so that a particle slides over the triangles without feeling them.
 
+mod candidate;
 mod contact;
 mod faces;
 mod nearest;
 mod placed_tile;
 mod surface;
+mod touching;
 mod triangle_tile;
 mod triangle_tiles;
-
-use glam::Vec3;
 
 use super::box_tree::Search;
 use super::load::{self, LoadPairs};
@@ -20,13 +20,14 @@ use super::order::{order_by_key, order_key};
 use super::tile::{TILE, TILE_LENGTH};
 use super::tile_tree::TileTree;
 use crate::kernels::Kernels;
-use crate::kernels::lanes::{LaneWork, PackedParticle, Wide};
+use crate::kernels::lanes::PackedParticle;
 use crate::scene::model::Model;
 use crate::state::tear::Torn;
+use candidate::{Candidate, add_candidate, has_candidate};
 use contact::SurfaceContact;
-use faces::Faces;
 use nearest::{Feature, Nearest};
 use surface::{Found, Surface, View};
+use touching::{TouchWork, Touching};
 pub(super) use triangle_tiles::SurfaceSearch;
 use triangle_tiles::{TriangleTiles, Wanted};
 
@@ -50,19 +51,6 @@ pub(super) struct SurfaceContacts {
     near: Vec<SurfaceContact>,
     /// Number of torn constraints and their hash, for which the torn triangles were looked up.
     torn: (usize, u64),
-}
-
-/// A particle that can touch a layer of cloth within the step.
-#[derive(Debug, Clone, Copy)]
-struct Candidate {
-    slot: u32,
-    /// The triangle at the nearest point in the last substep.
-    triangle: u32,
-    /// The candidate of this particle that was found before.
-    previous: Option<u32>,
-    key: u8,
-    /// True if the particle has come to a triangle that it never touches.
-    never_touches: bool,
 }
 
 impl SurfaceContacts {
@@ -149,7 +137,7 @@ impl SurfaceContacts {
             let first = surface.corners[triangle as usize][0];
             let key = order_key(particles[slot as usize], particles[first as usize]);
             let candidate = Candidate { slot, triangle, previous: None, key, never_touches: false };
-            enter(candidates, newest, candidate);
+            add_candidate(candidates, newest, candidate);
             Search::Continue(())
         };
         let except = |tiles| load_pairs.untouchable(tiles);
@@ -180,7 +168,7 @@ impl SurfaceContacts {
             if !is_known && !tiles.has_stray_near(triangle) {
                 let never_touches = load_pairs.never_touch(slot, triangle);
                 let kept = Candidate { triangle, never_touches, ..*candidate };
-                enter(candidates, newest, kept);
+                add_candidate(candidates, newest, kept);
             }
         }
     }
@@ -200,137 +188,6 @@ impl SurfaceContacts {
             contact.push_apart(states, friction);
         }
     }
-}
-
-/// Finds the candidates that are near at the end of the substep, and moves them on to the nearest triangles.
-struct TouchWork<'a> {
-    touching: Touching<'a>,
-    candidates: &'a mut [Candidate],
-    near: &'a mut Vec<SurfaceContact>,
-}
-
-impl LaneWork for TouchWork<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<W: Wide>(self) {
-        let Self { touching, candidates, near } = self;
-        let mut faces = Faces::default();
-        let (groups, rest) = candidates.as_chunks_mut::<8>();
-        for group in groups {
-            let (mut slots, mut triangles) = ([0; 8], [0; 8]);
-            for (lane, candidate) in group.iter().enumerate() {
-                (slots[lane], triangles[lane]) = (candidate.slot, candidate.triangle);
-            }
-            faces.find::<W>(touching.surface, touching.states, (slots, triangles));
-            for (lane, candidate) in group.iter_mut().enumerate() {
-                near.extend(if faces.lanes & (1 << lane) != 0 {
-                    touching.on_face(candidate, &faces, lane)
-                } else {
-                    touching.anywhere(candidate)
-                });
-            }
-        }
-        near.extend(rest.iter_mut().filter_map(|candidate| touching.anywhere(candidate)));
-    }
-}
-
-/// The conditions under which candidates touch.
-struct Touching<'a> {
-    surface: &'a Surface,
-    load_pairs: &'a LoadPairs,
-    states: &'a [PackedParticle],
-    /// Contact distance of all that are not near at load.
-    thickness: f32,
-    /// Candidates within this number of contact distances touch.
-    reach: f32,
-}
-
-impl Touching<'_> {
-    /// Returns the contact of a candidate whose nearest point is on the face of its triangle.
-    #[inline(always)]
-    fn on_face(&self, candidate: &Candidate, faces: &Faces, lane: usize) -> Option<SurfaceContact> {
-        let (weights, normal) = faces.lane(lane);
-        let found = (Vec3::from_array(normal), faces.heights[lane]);
-        self.contact(candidate, weights, found)
-    }
-
-    /// Moves a candidate on to the nearest triangle, and returns its contact.
-    #[inline(never)]
-    fn anywhere(&self, candidate: &mut Candidate) -> Option<SurfaceContact> {
-        let Candidate { slot, triangle, .. } = *candidate;
-        let view = View { particles: self.states, slot, time: 1.0 };
-        let found = self.surface.descend(triangle, view);
-        if found.triangle != triangle {
-            candidate.triangle = found.triangle;
-            candidate.never_touches = self.load_pairs.never_touch(slot, found.triangle);
-        }
-        self.contact(candidate, found.nearest.weights, separation(self.surface, &found, view))
-    }
-
-    #[inline(always)]
-    fn contact(
-        &self,
-        candidate: &Candidate,
-        weights: [f32; 3],
-        (normal, height): (Vec3, f32),
-    ) -> Option<SurfaceContact> {
-        let Candidate { slot, triangle, never_touches, .. } = *candidate;
-        let distance = self.load_pairs.distance([slot, triangle], self.thickness);
-        // False for NaN.
-        let is_near = height < self.reach * distance && !never_touches;
-        let [a, b, c] = self.surface.corners[triangle as usize];
-        let slots = [slot, a, b, c];
-        is_near.then_some(SurfaceContact { slots, weights, normal, distance })
-    }
-}
-
-/// Returns the direction from the nearest point to the side on which the path of the viewer starts, and its distance
-/// along it. NaN if the particle is on the point.
-#[inline(always)]
-fn separation(surface: &Surface, found: &Found, view: View<'_>) -> (Vec3, f32) {
-    let Found { triangle, ref nearest, corners } = *found;
-    let apart = -nearest.mean(corners);
-    let direction = if nearest.feature == Feature::Face {
-        let before = surface.place(triangle, View { time: 0.0, ..view });
-        let is_below = across(before).dot(-nearest.mean(before)) < 0.0;
-        if is_below { -across(corners) } else { across(corners) }
-    } else {
-        apart
-    };
-    let normal = direction / direction.dot(direction).sqrt();
-    (normal, normal.dot(apart))
-}
-
-/// A vector across a triangle.
-#[inline(always)]
-fn across([a, b, c]: [Vec3; 3]) -> Vec3 {
-    (b - a).cross(c - a)
-}
-
-/// Adds a candidate, and links it to the one of its particle that was added before.
-#[inline(always)]
-fn enter(candidates: &mut Vec<Candidate>, newest: &mut [Option<u32>], candidate: Candidate) {
-    #[allow(clippy::cast_possible_truncation, reason = "at most 8 for each particle")]
-    let index = candidates.len() as u32;
-    let previous = newest[candidate.slot as usize].replace(index);
-    candidates.push(Candidate { previous, ..candidate });
-}
-
-/// True if one of the candidates of a particle, of which the newest is given, fulfils a condition.
-fn has_candidate(
-    candidates: &[Candidate],
-    newest: Option<u32>,
-    condition: impl Fn(&Candidate) -> bool,
-) -> bool {
-    let mut at = newest;
-    while let Some(candidate) = at.map(|index| &candidates[index as usize]) {
-        if condition(candidate) {
-            return true;
-        }
-        at = candidate.previous;
-    }
-    false
 }
 
 /// Returns the part of a triangle with the nearest point, if that is a local minimum of the distance and comes near

@@ -124,9 +124,9 @@ fn negated<W: Wide>([x, y, z]: [W; 3]) -> [W; 3] {
 #[cfg(test)]
 mod tests {
     //! Eight nearest points at once against one after the other.
+    use super::super::load;
     use super::super::nearest::{Feature, Nearest};
-    use super::super::surface::{Found, View};
-    use super::super::{load, separation};
+    use super::super::surface::{Found, View, separation};
     use super::*;
     use crate::kernels::Kernels;
     use crate::kernels::lanes::LaneWork;

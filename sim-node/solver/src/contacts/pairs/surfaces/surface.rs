@@ -222,6 +222,29 @@ impl Surface {
     }
 }
 
+/// Returns the direction from the nearest point to the side on which the path of the viewer starts, and its distance
+/// along it. NaN if the particle is on the point.
+#[inline(always)]
+pub(super) fn separation(surface: &Surface, found: &Found, view: View<'_>) -> (Vec3, f32) {
+    let Found { triangle, ref nearest, corners } = *found;
+    let apart = -nearest.mean(corners);
+    let direction = if nearest.feature == Feature::Face {
+        let before = surface.place(triangle, View { time: 0.0, ..view });
+        let is_below = normal_of(before).dot(-nearest.mean(before)) < 0.0;
+        if is_below { -normal_of(corners) } else { normal_of(corners) }
+    } else {
+        apart
+    };
+    let normal = direction / direction.dot(direction).sqrt();
+    (normal, normal.dot(apart))
+}
+
+/// A normal of a triangle, of any length.
+#[inline(always)]
+fn normal_of([a, b, c]: [Vec3; 3]) -> Vec3 {
+    (b - a).cross(c - a)
+}
+
 /// An edge of a triangle.
 struct TriangleEdge {
     /// Ascending.
