@@ -123,7 +123,7 @@ impl SurfaceContacts {
             };
             // Triangles that share the nearest point are one candidate.
             let is_known = has_candidate(candidates, newest[slot as usize], |known| {
-                !known.never_touches && surface.shares(triangle, feature, known.triangle)
+                surface.shares(triangle, feature, known)
             });
             if is_known {
                 return Search::Continue(());
@@ -163,7 +163,7 @@ impl SurfaceContacts {
             let view = View { particles: search.states, slot, time: 0.0 };
             let Found { triangle, nearest, .. } = surface.descend(candidate.triangle, view);
             let is_known = has_candidate(candidates, newest[slot as usize], |known| {
-                !known.never_touches && surface.shares(triangle, nearest.feature, known.triangle)
+                surface.shares(triangle, nearest.feature, known)
             });
             if !is_known && !tiles.has_stray_near(triangle) {
                 let never_touches = load_pairs.never_touch(slot, triangle);

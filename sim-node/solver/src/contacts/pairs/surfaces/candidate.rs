@@ -26,15 +26,16 @@ pub(super) fn add_candidate(
     candidates.push(Candidate { previous, ..candidate });
 }
 
-/// True if one of the candidates of a particle, of which the newest is given, fulfils a condition.
+/// True if a particle, whose newest candidate is given, has a candidate on a triangle that fulfils a condition.
+/// Triangles that it never touches do not count.
 pub(super) fn has_candidate(
     candidates: &[Candidate],
     newest: Option<u32>,
-    condition: impl Fn(&Candidate) -> bool,
+    condition: impl Fn(u32) -> bool,
 ) -> bool {
     let mut at = newest;
     while let Some(candidate) = at.map(|index| &candidates[index as usize]) {
-        if condition(candidate) {
+        if !candidate.never_touches && condition(candidate.triangle) {
             return true;
         }
         at = candidate.previous;
