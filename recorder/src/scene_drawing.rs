@@ -237,6 +237,7 @@ mod tests {
         let mesh = ColliderMesh {
             vertices: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
             triangles: vec![[0, 1, 2]],
+            is_solid: false,
         };
         let collider_meshes = [(1, mesh)].into();
         let mut drawing = SceneDrawing::new(DrawnMesh { collider_meshes, ..DrawnMesh::default() });

@@ -232,6 +232,7 @@ mod tests {
         let mesh = ColliderMesh {
             vertices: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
             triangles: vec![[0, 1, 2]],
+            is_solid: false,
         };
         draw(&[collider], PlaneExtent::around(bounds), &mut entity);
         entity.triangles = draw_meshes(&[collider], &[(0, mesh)].into());

@@ -250,6 +250,29 @@ fn a_shape_beside_a_mesh_or_fixed_across_it_causes_no_warning() {
 }
 
 #[test]
+fn a_shape_that_starts_across_a_solid_plate_causes_a_warning() {
+    let plate = "[[collider]]\nshape = \"mesh\"\nsolid = true\ncenter = [0.5, 0, 0]\nvertices = [[-0.1, -1, -1], \
+                 [0.1, -1, -1], [0, 2, 0], [0, -1, 2]]\nfaces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]\n";
+    assert_warns(
+        &format!("{PAIR}{plate}"),
+        "constraint 0 starts across collider 0, a mesh: particles 0 and 1 are on different sides of it",
+    );
+}
+
+#[test]
+fn a_shape_that_starts_in_a_solid_mesh_causes_a_warning() {
+    let tetrahedron = "[[collider]]\nshape = \"mesh\"\nvertices = [[-1, -1, -1], [5, -1, -1], [-1, 5, -1], [-1, -1, 5]]\n\
+                       faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]\n";
+    let solid = format!("{PAIR}{tetrahedron}solid = true\n");
+    assert_warns(
+        &solid,
+        "2 particles start inside a collider; the deepest is particle 0, 1 m inside collider 0",
+    );
+    let apart = format!("{}{tetrahedron}solid = true\n", PAIR.replace(", 0, 0]", ", 5, 0]"));
+    assert_eq!(warnings(&apart), Vec::<String>::new());
+}
+
+#[test]
 fn a_thickness_that_reaches_second_neighbours_causes_a_warning() {
     let contact = |thickness: f32| {
         format!(

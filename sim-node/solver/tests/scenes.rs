@@ -143,6 +143,13 @@ const EVERY_KEY: &str = r#"
         tear_stretch = inf
         tear_distance = 0.2
         tear_force = 12.5
+        [[collider]]
+        shape = "mesh"
+        center = [9, 0, 0]
+        distance = 0.01
+        vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+        faces = [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]]
+        solid = true
         [[generate]]
         shape = "rope"
         count = 5

@@ -264,7 +264,8 @@ fn colliders_are_drawn_where_they_are_and_late_subscribers_receive_them() {
 fn the_triangles_of_a_mesh_are_sent_again_only_if_it_moves_or_a_client_may_lack_them() {
     let bench = Bench::new(None);
     let listener = bench.listen(&["/scene"]);
-    let mesh = ColliderMesh { vertices: vec![[0.0; 3]; 3], triangles: vec![[0, 1, 2]] };
+    let mesh =
+        ColliderMesh { vertices: vec![[0.0; 3]; 3], triangles: vec![[0, 1, 2]], is_solid: false };
     let collider_meshes = [(0, mesh)].into();
     let scene = Scene { rate_hz: 100, collider_meshes, ..Scene::default() };
     bench.publisher.begin_load(&scene);

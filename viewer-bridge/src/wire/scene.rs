@@ -175,6 +175,8 @@ fn decode_meshes(cursor: &mut Cursor<'_>) -> Result<ColliderMeshes, DecodeError>
             vertices: cursor.list(vertices, 12, Cursor::vector)?,
             triangles: cursor
                 .list(triangles, 12, |cursor| Ok([cursor.u32()?, cursor.u32()?, cursor.u32()?]))?,
+            // The page does not need it.
+            is_solid: false,
         };
         meshes.insert(collider as usize, mesh);
     }

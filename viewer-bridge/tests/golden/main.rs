@@ -62,7 +62,7 @@ fn scene() -> Scene {
 
 fn triangle_mesh() -> ColliderMesh {
     let vertices = vec![[0.0; 3], [0.5, 0.0, 0.0], [0.0, 0.5, 0.0], [0.0, 0.0, 0.25]];
-    ColliderMesh { vertices, triangles: vec![[0, 1, 2], [0, 2, 3]] }
+    ColliderMesh { vertices, triangles: vec![[0, 1, 2], [0, 2, 3]], is_solid: false }
 }
 
 fn head() -> FrameHead {

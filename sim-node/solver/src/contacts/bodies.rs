@@ -174,7 +174,7 @@ impl Meeting<'_> {
         let (path, _) = self.path();
         let mut room = mesh.room(&path);
         let mut triangles = mesh.list(lists, number, &room);
-        if triangles.are_none() {
+        if room.is_free(&triangles) {
             return;
         }
         let mut surface = *surface;

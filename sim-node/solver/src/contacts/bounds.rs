@@ -63,6 +63,20 @@ impl Bounds {
         self.contains(other.min) && self.contains(other.max)
     }
 
+    pub(super) fn center(&self) -> [f32; 3] {
+        axes(|axis| 0.5 * (self.min[axis] + self.max[axis]))
+    }
+
+    /// Square of the distance of a point from the box.
+    pub(super) fn square_to(&self, point: [f32; 3]) -> f32 {
+        let [x, y, z] = axes(|axis| {
+            let (below, above) = (self.min[axis] - point[axis], point[axis] - self.max[axis]);
+            let outside = if below > above { below } else { above };
+            if outside > 0.0 { outside } else { 0.0 }
+        });
+        x * x + y * y + z * z
+    }
+
     /// Largest distance of a point of this box from a point of the other one, on each axis.
     #[inline(always)]
     pub(super) fn distances_max(&self, other: &Self) -> [f32; 3] {

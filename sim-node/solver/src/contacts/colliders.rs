@@ -7,7 +7,7 @@ use sim_types::Reason;
 
 use super::bodies::driven_body::{BodyMotion, BodyState, DrivenBody};
 use super::contact_substep::ContactSubstep;
-use super::mesh::CollisionMesh;
+use super::mesh::collision_mesh::CollisionMesh;
 use super::placed_shape::PlacedShape;
 use crate::frame::{Frame, angular_velocity, rotation_about};
 use crate::scene::definition::collider::{ColliderBody, ColliderGeometry, SceneCollider};

@@ -247,7 +247,7 @@ impl Contacts {
             let mut room = mesh.room(&path);
             let number = particles.first() + index;
             let mut triangles = mesh.list(&mut self.near_meshes, number, &room);
-            if triangles.are_none() {
+            if room.is_free(&triangles) {
                 continue;
             }
             for push_count in 0..=PUSHES_MAX {

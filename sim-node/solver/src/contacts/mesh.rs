@@ -4,7 +4,11 @@
 //! it. The particle stays on the side on which the path starts, so open and
 //! thin meshes work like closed ones, and no state is kept between substeps. Where it cannot be pushed
 //! off all triangles, it stays where the path starts, in the frame of the mesh.
+//!
+//! A solid mesh also has an inside. A particle there leaves it at the nearest point of the surface.
 
+pub(crate) mod collision_mesh;
+pub(crate) mod inside;
 pub(crate) mod near;
 mod tree;
 mod triangle;
@@ -19,19 +23,14 @@ use super::hit::Hit;
 use super::path::SubstepPath;
 use super::placed_frame::PlacedFrame;
 use super::zone::Zone;
-use crate::scene::definition::collider::ColliderMesh;
+use collision_mesh::{CollisionMesh, TOLERANCE};
+use inside::SurfacePoint;
 use near::{NearMeshes, NearQuery, NearTriangles};
-use tree::TriangleTree;
 use triangle::{Gap, MeshPath, Touch, Triangle};
 
-/// Rounding of a position in the frame of a mesh, relative to the coordinates.
-const TOLERANCE: f32 = 4.0 * f32::EPSILON;
 /// Least distance that particles keep from a mesh, in tolerances. It exceeds the rounding of a
 /// particle on the surface, so that its side is certain.
 const SKIN: f32 = 8.0;
-/// Height up to which a triangle is a sliver, in tolerances. The tolerance of its neighbours closes the
-/// gap that it leaves.
-const SLIVER: f32 = 2.0;
 /// Length of a push for which there is room, relative to that of the path. Most paths run along the mesh and
 /// are pushed less.
 const PUSH_SHARE: f32 = 0.25;
@@ -40,49 +39,6 @@ const SUBSTEPS_AHEAD: f32 = 2.0;
 /// Largest number of pushes of a particle in a substep. A particle in a wedge comes nearer to both sides
 /// with each.
 pub(crate) const PUSHES_MAX: usize = 8;
-
-/// The triangles of a mesh, ready for contacts. Immutable from load to load.
-#[derive(Debug, Default)]
-pub(crate) struct CollisionMesh {
-    tree: TriangleTree,
-    /// Index of the collider.
-    collider: usize,
-    /// Largest coordinate on each axis.
-    extents: Vec3,
-}
-
-impl CollisionMesh {
-    pub(crate) fn new(mesh: &ColliderMesh, collider: usize) -> Self {
-        let height_min = sliver_height(&mesh.vertices);
-        let corners = mesh.triangles.iter().map(|one| corners(&mesh.vertices, *one));
-        let triangles = corners.filter_map(|one| Triangle::new(one, height_min)).collect();
-        Self { tree: TriangleTree::new(triangles), collider, extents: extents(&mesh.vertices) }
-    }
-}
-
-/// Removes the triangles that are slivers: they have no normal, or none that f32 can tell. Returns
-/// their number.
-pub(crate) fn remove_slivers(mesh: &mut ColliderMesh) -> usize {
-    let ColliderMesh { vertices, triangles } = mesh;
-    let (height_min, count) = (sliver_height(vertices), triangles.len());
-    triangles.retain(|one| Triangle::new(corners(vertices, *one), height_min).is_some());
-    count - triangles.len()
-}
-
-fn corners(vertices: &[[f32; 3]], triangle: [u32; 3]) -> [[f32; 3]; 3] {
-    triangle.map(|corner| vertices[corner as usize])
-}
-
-fn extents(vertices: &[[f32; 3]]) -> Vec3 {
-    let Bounds { min, max } = Bounds::around(vertices.iter().copied());
-    let extent = |axis: usize| if -min[axis] > max[axis] { -min[axis] } else { max[axis] };
-    Vec3::new(extent(0), extent(1), extent(2))
-}
-
-/// Height over the longest edge up to which a triangle is a sliver.
-fn sliver_height(vertices: &[[f32; 3]]) -> f64 {
-    f64::from(SLIVER * TOLERANCE * extents(vertices).element_sum())
-}
 
 /// A mesh in a substep.
 #[derive(Debug, Clone)]
@@ -132,7 +88,8 @@ impl PlacedMesh {
         let length = path.motion.dot(path.motion).sqrt();
         let bounds = Bounds::around([path.start.to_array(), path.end().to_array()]);
         let rounding = self.gap.tolerance + 2.0 * path.rounding;
-        Room { ends: bounds.grown(PUSH_SHARE * length + rounding), length }
+        let ends = bounds.grown(PUSH_SHARE * length + rounding);
+        Room { ends, length, starts_inside: self.mesh.is_inside(path.start, self.gap.tolerance) }
     }
 
     /// True if a path after some pushes is still within the room of the first one.
@@ -156,6 +113,13 @@ impl PlacedMesh {
         lists.find(&self.mesh.tree, &query)
     }
 
+    /// Returns the depth of a point inside a solid, or `None` if it is outside or the mesh is not solid.
+    pub(crate) fn depth(&self, point: Vec3) -> Option<f32> {
+        let point = self.now.local(point);
+        let SurfacePoint { height, .. } = self.mesh.surface_near(point, self.gap.tolerance)?;
+        (height < 0.0).then_some(-height)
+    }
+
     /// Finds what stops a path after this number of pushes, or `None` if nothing does.
     pub(crate) fn stop(
         &self,
@@ -165,6 +129,9 @@ impl PlacedMesh {
         push_count: usize,
     ) -> Option<Stop> {
         let path = self.path(path);
+        if room.starts_inside {
+            return self.way_out(&path, push_count).map(Stop::Push);
+        }
         let is_resolved = |touch: &Touch| match push_count {
             0 => true,
             PUSHES_MAX => touch.is_passage(),
@@ -181,6 +148,16 @@ impl PlacedMesh {
         let Touch { normal, depth, .. } = first?;
         let hit = Hit { normal: self.now.unit_to_scene(normal), depth };
         Some(if push_count == PUSHES_MAX { Stop::Hold } else { Stop::Push(hit) })
+    }
+
+    /// Finds where a particle leaves the solid in which its path starts. Returns `None` after the last push.
+    fn way_out(&self, path: &MeshPath, push_count: usize) -> Option<Hit> {
+        let SurfacePoint { normal, height } =
+            self.mesh.surface_near(path.end(), self.gap.tolerance)?;
+        let depth = self.gap.distance - height;
+        let depth_min = if push_count == 0 { 0.0 } else { self.gap.tolerance };
+        let is_pushed = push_count < PUSHES_MAX && depth > depth_min;
+        is_pushed.then(|| Hit { normal: self.now.unit_to_scene(normal), depth })
     }
 
     /// Displacement of a particle that stays where its path starts, in the frame of the mesh.
@@ -233,6 +210,15 @@ pub(crate) struct Room {
     ends: Bounds,
     /// Length of the first path.
     length: f32,
+    /// True if the paths start inside a solid.
+    starts_inside: bool,
+}
+
+impl Room {
+    /// True if no path can touch any of these triangles, which are those near it, or leave a solid.
+    pub(crate) fn is_free(&self, triangles: &NearTriangles) -> bool {
+        triangles.are_none() && !self.starts_inside
+    }
 }
 
 fn reach(mesh: &CollisionMesh, frames: [&PlacedFrame; 2]) -> f32 {

@@ -58,25 +58,36 @@ pub(crate) fn place_obstacles(
     }
 }
 
-/// Depth of a position inside a collider at load. None if it is outside, or inside by no more than
-/// rounding.
-pub(crate) fn depth_at_load(
-    scene: &SceneCollider,
-    position: [f32; 3],
-    is_planar: bool,
-) -> Option<f32> {
-    if scene.mesh.is_some() {
-        // A mesh has no inside.
-        return None;
+/// The solids of a collider in their pose at load.
+#[derive(Debug)]
+pub(crate) struct SolidsAtLoad([Option<Solid>; OBSTACLES_PER_COLLIDER]);
+
+impl SolidsAtLoad {
+    pub(crate) fn new(scene: &SceneCollider, is_planar: bool) -> Self {
+        if scene.mesh.as_ref().is_some_and(|mesh| !mesh.is_solid) {
+            return Self(Default::default());
+        }
+        let interval = Interval { start: 0.0, end: 0.0 };
+        let substep =
+            ContactSubstep { h: 1.0, rest_speed: 0.0, gain: Vec3::ZERO, interval, is_planar };
+        Self(solids(&Collider::new(0, scene), &substep))
     }
-    let interval = Interval { start: 0.0, end: 0.0 };
-    let substep = ContactSubstep { h: 1.0, rest_speed: 0.0, gain: Vec3::ZERO, interval, is_planar };
-    let path = SubstepPath { start: Vec3::from_array(position), displacement: Vec3::ZERO };
-    let solids = solids(&Collider::new(0, scene), &substep);
-    let mut hits = solids.iter().flatten().filter_map(|solid| Some((solid, solid.hit(&path)?)));
-    let (_, hit) =
-        hits.find(|(solid, hit)| hit.depth > rounding(&(&path).into(), solid.reach()))?;
-    Some(hit.depth)
+
+    /// Depth of a position inside a solid. None if it is outside, or inside by no more than rounding.
+    pub(crate) fn depth(&self, position: [f32; 3]) -> Option<f32> {
+        let path = SubstepPath { start: Vec3::from_array(position), displacement: Vec3::ZERO };
+        self.0.iter().flatten().find_map(|solid| {
+            let (start, displacement) = (path.start.to_array(), [0.0; 3]);
+            let depth = match solid {
+                Solid::Mesh(mesh) if solid.zone().may_meet(start, displacement) => {
+                    mesh.depth(path.start)
+                }
+                Solid::Mesh(_) => None,
+                convex => convex.hit(&path).map(|hit| hit.depth),
+            };
+            depth.filter(|depth| *depth > rounding(&(&path).into(), solid.reach()))
+        })
+    }
 }
 
 /// Bound on the rounding of a depth after a few operations on the coordinates of a path and a solid.

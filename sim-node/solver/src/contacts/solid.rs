@@ -12,7 +12,8 @@ use solid_box::{FaceHit, SolidBox};
 use super::colliders::Collider;
 use super::contact_substep::ContactSubstep;
 use super::hit::Hit;
-use super::mesh::{CollisionMesh, PlacedMesh};
+use super::mesh::PlacedMesh;
+use super::mesh::collision_mesh::CollisionMesh;
 use super::path::SubstepPath;
 use super::placed_frame::PlacedFrame;
 use super::placed_shape::PlacedShape;
@@ -83,7 +84,7 @@ pub(crate) fn solids(collider: &Collider, substep: &ContactSubstep) -> [Option<S
 
 impl Solid {
     /// Finds where a particle leaves the solid, if its path ends inside or, for a box, passes
-    /// through. Meshes have no inside; see [`PlacedMesh`] for their contacts.
+    /// through. See [`PlacedMesh`] for the contacts of meshes.
     #[inline(always)]
     pub(crate) fn hit(&self, path: &SubstepPath) -> Option<Hit> {
         match self {

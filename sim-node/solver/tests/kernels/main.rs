@@ -368,6 +368,18 @@ fn threads_give_the_same_bits_on_a_mesh() {
     assert_same_bits_of_threads(&sewn, "graph", 10);
 }
 
+/// A sheet and a graph of the same size start in a block, which turns.
+#[test]
+fn threads_give_the_same_bits_in_a_solid_mesh() {
+    let block = "[[collider]]\nshape = \"mesh\"\ncenter = [4, 0.01, 4]\nfriction = 0.4\nsolid = true\n\
+        angular_velocity = [0.01, 0.1, 0]\nvertices = [[-3, -1, -3], [3, -1, -3], [3, -1, 3], [-3, -1, 3], [0, 1, 0]]\n\
+        faces = [[0, 1, 2, 3], [1, 0, 4], [2, 1, 4], [3, 2, 4], [0, 3, 4]]\n";
+    let text = sheet(180, 180, "substeps = 2", LINKS) + block;
+    assert_same_bits_of_threads(&text, "rows", 10);
+    let sewn = format!("{text}[[constraint]]\nparticles = [500, 900]\n");
+    assert_same_bits_of_threads(&sewn, "graph", 10);
+}
+
 #[test]
 fn threads_give_the_same_bits_on_large_graphs() {
     // A constraint from each of two sheets to the other turns both into a graph.

@@ -3,9 +3,11 @@
 mod bodies;
 mod cloths;
 mod crossings;
+mod mesh;
 mod meshes;
 mod particles;
 mod scenes;
+mod solid_meshes;
 mod surfaces;
 
 use proptest::prelude::*;

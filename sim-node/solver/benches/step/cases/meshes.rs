@@ -1,5 +1,5 @@
-//! Cost of colliders that are meshes: a sheet on a ball of triangles, on the same ball as a sphere, and without
-//! a collider.
+//! Cost of colliders that are meshes: a sheet on a ball of triangles, open or solid, on the same ball as a sphere, and
+//! without a collider.
 
 use std::f64::consts::FRAC_PI_4;
 
@@ -29,6 +29,7 @@ struct Meshes {
     load_ms: f64,
     /// Median over the steps, for each particle and substep.
     mesh_ns: f64,
+    solid_ns: f64,
     sphere_ns: f64,
     free_ns: f64,
     /// Particles within 1 mm of their distance from the ball.
@@ -40,6 +41,7 @@ impl Row for Meshes {
         "triangles",
         "load: ms",
         "mesh: ns a particle and substep",
+        "solid",
         "sphere",
         "no collider",
         "touching of 10,000",
@@ -54,6 +56,7 @@ impl Row for Meshes {
             self.triangles.to_string(),
             format!("{:.0}", self.load_ms),
             format!("{:.1}", self.mesh_ns),
+            format!("{:.1}", self.solid_ns),
             format!("{:.1}", self.sphere_ns),
             format!("{:.1}", self.free_ns),
             self.touching.to_string(),
@@ -76,15 +79,19 @@ fn measure(case: String, cells: usize) -> Meshes {
     let mesh =
         "[[collider]]\nfriction = 0.5\nshape = \"mesh\"\npath = \"ball.obj\"\ndistance = 0.002\n";
     let mesh = scene_text(mesh);
-    let load = || Scene::from_toml_with_files(&mesh, "bench", &|_| Ok(obj.clone())).unwrap();
+    let load = |text: &str| {
+        let scene = Scene::from_toml_with_files(text, "bench", &|_| Ok(obj.clone()));
+        Solver::new(&scene.unwrap())
+    };
     let mut solver = None;
-    let load_ns = cpu_ns(|| solver = Some(Solver::new(&load())));
-    let mut solver = solver.unwrap();
+    let load_ns = cpu_ns(|| solver = Some(load(&mesh)));
+    let (mut solver, mut on_solid) = (solver.unwrap(), load(&(mesh + "solid = true\n")));
     let sphere =
         "[[collider]]\nfriction = 0.5\nshape = \"sphere\"\nradius = 0.302\ncenter = [0, 0, 0]\n";
     let [mut on_sphere, mut free] = [sphere, ""]
         .map(|collider| Solver::new(&Scene::from_toml(&scene_text(collider), "bench").unwrap()));
-    let [mesh_ns, sphere_ns, free_ns] = [&mut solver, &mut on_sphere, &mut free].map(|solver| {
+    let solvers = [&mut solver, &mut on_solid, &mut on_sphere, &mut free];
+    let [mesh_ns, solid_ns, sphere_ns, free_ns] = solvers.map(|solver| {
         (0..STEPS_BEFORE).for_each(|_| solver.step());
         let times = (0..STEPS).map(|_| cpu_ns(|| solver.step())).collect();
         median(times) / f64::from(SUBSTEPS * SIDE * SIDE)
@@ -95,6 +102,7 @@ fn measure(case: String, cells: usize) -> Meshes {
         triangles: 12 * cells * cells,
         load_ms: load_ns / 1e6,
         mesh_ns,
+        solid_ns,
         sphere_ns,
         free_ns,
         touching: solver.particles().iter().filter(|one| is_touching(one.position)).count(),
@@ -128,6 +136,8 @@ fn ball(cells: usize) -> String {
             if place % row < cells && place / row < cells {
                 let [a, b, c, d] =
                     [0, 1, row + 1, row].map(|step| side * row * row + place + step + 1);
+                // Counterclockwise from outside.
+                let [b, d] = if side % 2 == 0 { [b, d] } else { [d, b] };
                 faces += &format!("f {a} {b} {c}\nf {a} {c} {d}\n");
             }
         }

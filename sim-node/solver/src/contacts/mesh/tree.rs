@@ -2,7 +2,9 @@
 
 use std::ops::ControlFlow;
 
-use super::triangle::Triangle;
+use glam::Vec3;
+
+use super::triangle::{NearestPoint, Triangle};
 use crate::contacts::bounds::Bounds;
 
 /// Largest number of triangles in a leaf.
@@ -25,17 +27,27 @@ struct Node {
     triangles: [u32; 2],
 }
 
+/// The triangle that is nearest to a point.
+pub(super) struct NearestTriangle {
+    pub(super) triangle: u32,
+    pub(super) nearest: NearestPoint,
+    /// Square of the distance.
+    square: f32,
+}
+
 impl TriangleTree {
-    /// Builds the tree: each node is divided at the median across its longest side.
-    pub(super) fn new(triangles: Vec<Triangle>) -> Self {
+    /// Builds the tree: each node is divided at the median across its longest side. Also returns, by triangle of the
+    /// tree, its index in `triangles`.
+    pub(super) fn new(triangles: Vec<Triangle>) -> (Self, Vec<u32>) {
         let mut tree = Self { triangles, nodes: Vec::new() };
         let mut items: Vec<_> = (0_u32..).zip(&tree.triangles).map(Item::new).collect();
         if !items.is_empty() {
             tree.divide(&mut items, 0);
         }
-        let sorted = items.iter().map(|item| tree.triangles[item.triangle as usize].clone());
+        let order: Vec<_> = items.iter().map(|item| item.triangle).collect();
+        let sorted = order.iter().map(|triangle| tree.triangles[*triangle as usize].clone());
         tree.triangles = sorted.collect();
-        tree
+        (tree, order)
     }
 
     /// Adds the node of some items, the first of which has the place `first` in the order.
@@ -80,6 +92,65 @@ impl TriangleTree {
         }
         ControlFlow::Continue(())
     }
+
+    /// Returns the box around all triangles.
+    pub(super) fn bounds(&self) -> Bounds {
+        self.nodes.first().map_or(Bounds::EMPTY, |root| root.bounds)
+    }
+
+    /// Returns the triangle that is nearest to a point. `None` for NaN.
+    pub(super) fn nearest(&self, point: Vec3) -> Option<NearestTriangle> {
+        let mut found = None;
+        // A triangle that is near, so that most boxes can be left out.
+        self.find_nearer(self.leaf_near(point)?, point, &mut found);
+        let mut at = 0;
+        while let Some(node) = self.nodes.get(at) {
+            let is_out = found.as_ref().is_some_and(|found| node.square_to(point) >= found.square);
+            if is_out {
+                at = node.next as usize;
+            } else {
+                self.find_nearer(node, point, &mut found);
+                at += 1;
+            }
+        }
+        found
+    }
+
+    /// Returns the leaf to which the nearer child leads at each node.
+    fn leaf_near(&self, point: Vec3) -> Option<&Node> {
+        let mut at = 0;
+        let mut node = self.nodes.first()?;
+        while !node.is_leaf() {
+            let low = self.nodes.get(at + 1)?;
+            let high = self.nodes.get(low.next as usize)?;
+            let is_low = low.square_to(point) <= high.square_to(point);
+            (at, node) = if is_low { (at + 1, low) } else { (low.next as usize, high) };
+        }
+        Some(node)
+    }
+
+    /// Replaces a triangle by the nearest one of a leaf, if that is nearer.
+    fn find_nearer(&self, leaf: &Node, point: Vec3, nearest: &mut Option<NearestTriangle>) {
+        let [first, end] = leaf.triangles;
+        for triangle in first..end {
+            let found = self.triangles[triangle as usize].nearest(point);
+            let square = found.apart.dot(found.apart);
+            let limit = nearest.as_ref().map_or(f32::INFINITY, |nearest| nearest.square);
+            if square < limit {
+                *nearest = Some(NearestTriangle { triangle, nearest: found, square });
+            }
+        }
+    }
+}
+
+impl Node {
+    fn is_leaf(&self) -> bool {
+        self.triangles[0] < self.triangles[1]
+    }
+
+    fn square_to(&self, point: Vec3) -> f32 {
+        self.bounds.square_to(point.to_array())
+    }
 }
 
 /// A triangle during the construction.
@@ -92,8 +163,7 @@ struct Item {
 impl Item {
     fn new((index, triangle): (u32, &Triangle)) -> Self {
         let bounds = Bounds::around(triangle.corners.map(|corner| corner.to_array()));
-        let center = std::array::from_fn(|axis| 0.5 * (bounds.min[axis] + bounds.max[axis]));
-        Self { triangle: index, bounds, center }
+        Self { triangle: index, bounds, center: bounds.center() }
     }
 }
 

@@ -41,6 +41,24 @@ pub(crate) struct Gap {
     pub(super) tolerance: f32,
 }
 
+/// Part of a triangle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Feature {
+    Face,
+    /// The edge from this corner to the next.
+    Edge(usize),
+    Corner(usize),
+}
+
+/// The point of a triangle that is nearest to another point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct NearestPoint {
+    /// Part of the triangle that holds it.
+    pub(super) feature: Feature,
+    /// From it to the other point.
+    pub(super) apart: Vec3,
+}
+
 /// A contact with a triangle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Touch {
@@ -91,6 +109,32 @@ impl Triangle {
             normal: normal.as_vec3(),
             inwards: inwards.map(DVec3::as_vec3),
         })
+    }
+
+    /// Unit vector.
+    pub(super) fn normal(&self) -> Vec3 {
+        self.normal
+    }
+
+    /// Finds the point that is nearest to another point.
+    pub(super) fn nearest(&self, point: Vec3) -> NearestPoint {
+        if self.has_beside(point, 0.0) {
+            let height = self.normal.dot(point - self.corners[0]);
+            return NearestPoint { feature: Feature::Face, apart: self.normal * height };
+        }
+        let [a, b, c] = self.corners;
+        let on_edge = |edge: usize, ends: [Vec3; 2]| {
+            let share = share_of_nearest(ends, point);
+            let feature = match share {
+                0.0 => Feature::Corner(edge),
+                1.0 => Feature::Corner((edge + 1) % 3),
+                _ => Feature::Edge(edge),
+            };
+            NearestPoint { feature, apart: point - (ends[0] + (ends[1] - ends[0]) * share) }
+        };
+        let square = |one: &NearestPoint| one.apart.dot(one.apart);
+        let nearer = |one, other| if square(&other) < square(&one) { other } else { one };
+        nearer(nearer(on_edge(0, [a, b]), on_edge(1, [b, c])), on_edge(2, [c, a]))
     }
 
     /// False if the plane or an edge separates the triangle from a box. A box beside a corner may count as
@@ -185,10 +229,15 @@ fn unit(vector: DVec3) -> DVec3 {
 }
 
 fn nearest_on_segment([a, b]: [Vec3; 2], point: Vec3) -> Vec3 {
+    a + (b - a) * share_of_nearest([a, b], point)
+}
+
+/// The part of the way along a segment at which it is nearest to a point, 0 to 1.
+fn share_of_nearest([a, b]: [Vec3; 2], point: Vec3) -> f32 {
     let edge = b - a;
     let along = edge.dot(point - a) / edge.dot(edge);
     let share = if along > 0.0 { along } else { 0.0 };
-    a + edge * if share < 1.0 { share } else { 1.0 }
+    if share < 1.0 { share } else { 1.0 }
 }
 
 #[cfg(test)]

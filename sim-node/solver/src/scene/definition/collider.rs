@@ -51,9 +51,12 @@ pub struct ColliderMesh {
     /// Positions, with the scale of the scene file applied.
     #[serde(serialize_with = "decimal::vectors::serialize")]
     pub vertices: Vec<[f32; 3]>,
-    /// Corners of each triangle, as indices of vertices. Either side can be touched.
+    /// Corners of each triangle, as indices of vertices. Either side can be touched, unless the mesh is solid.
     #[serde(rename = "faces")]
     pub triangles: Vec<[u32; 3]>,
+    /// True if the triangles enclose a solid, which particles inside leave.
+    #[serde(rename = "solid", skip_serializing_if = "is_false")]
+    pub is_solid: bool,
 }
 
 /// Meshes by the index of their collider.
@@ -62,6 +65,12 @@ pub type ColliderMeshes = BTreeMap<usize, ColliderMesh>;
 /// Decides whether to write the key, which only boxes and meshes accept.
 fn is_zero(vector: &[f32; 3]) -> bool {
     *vector == [0.0; 3]
+}
+
+/// Decides whether to write the key of solids.
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde requires")]
+fn is_false(value: &bool) -> bool {
+    !*value
 }
 
 /// Shape, size and pose of a collider.

@@ -12,7 +12,8 @@ use super::value::{
     Number, Quaternion, Spanned, Table, TableKeys, Vector, Word, append_elements, element_count,
 };
 use crate::checks::is_near;
-use crate::contacts::mesh::remove_slivers;
+use crate::contacts::mesh::collision_mesh::remove_slivers;
+use crate::contacts::mesh::inside::{SolidFlaw, find_flaw, remove_collapsed};
 use crate::scene::definition::collider::{ColliderGeometry, ColliderMesh, SceneCollider};
 use crate::scene::error::SceneError;
 use crate::scene::mesh::{Mesh, fan};
@@ -235,11 +236,6 @@ impl<F: Fn(&str) -> String> ColliderFields<'_, '_, F> {
             let problem = "a mesh needs 3 dimensions (allowed: all other shapes)";
             return reader.error(self.span.clone(), &(self.field)("shape"), problem);
         }
-        if let Some(solid) = file.solid.as_ref().filter(|solid| *solid.get_ref()) {
-            let problem = "a mesh cannot be solid: particles stay on the side of its triangles \
-                           on which they are (allowed: false)";
-            return reader.error(solid.span(), &(self.field)("solid"), problem);
-        }
         let distance = file
             .distance
             .as_ref()
@@ -269,7 +265,10 @@ impl<F: Fn(&str) -> String> ColliderFields<'_, '_, F> {
         let mut mesh = ColliderMesh {
             vertices: scaled.collect(),
             triangles: mesh.faces.iter().flat_map(|face| fan(face)).collect(),
+            is_solid: file.solid.as_ref().is_some_and(|solid| *solid.get_ref()),
         };
+        let collapsed_count = if mesh.is_solid { remove_collapsed(&mut mesh) } else { 0 };
+        let flaw = if mesh.is_solid { find_flaw(&mesh) } else { None };
         let sliver_count = remove_slivers(&mut mesh);
         if let Some(far) = mesh.vertices.iter().find(|vertex| !is_near(*vertex)) {
             let problem = format!("reach {far:?} (allowed: -1e7 to 1e7)");
@@ -279,6 +278,10 @@ impl<F: Fn(&str) -> String> ColliderFields<'_, '_, F> {
             let problem = "have no triangle with an area (allowed: at least one)";
             return self.wrong_mesh("faces", problem.to_owned());
         }
+        if mesh.is_solid {
+            self.check_solid(flaw, sliver_count)?;
+        }
+        let sliver_count = sliver_count + collapsed_count;
         if sliver_count > 0 {
             let triangles = if sliver_count == 1 { "triangle is" } else { "triangles are" };
             let field = (self.field)("mesh");
@@ -288,6 +291,42 @@ impl<F: Fn(&str) -> String> ColliderFields<'_, '_, F> {
             ));
         }
         Ok(mesh)
+    }
+
+    /// Refuses a solid whose triangles do not enclose it.
+    fn check_solid(&self, flaw: Option<SolidFlaw>, sliver_count: usize) -> Result<(), SceneError> {
+        let problem = match flaw {
+            Some(SolidFlaw::OpenEdge { ends: [from, to], counts: [forth, back] }) => {
+                let cause = match forth + back {
+                    1 => "belongs to one triangle only".to_owned(),
+                    2 => "joins two triangles of opposite winding".to_owned(),
+                    count => format!("belongs to {count} triangles"),
+                };
+                format!("the mesh is not closed: the edge from {from:?} to {to:?} {cause}")
+            }
+            Some(SolidFlaw::Flat(vertex)) => {
+                format!("the part of the mesh with the vertex {vertex:?} encloses no volume")
+            }
+            Some(SolidFlaw::Reversed(vertex)) => format!(
+                "the part of the mesh with the vertex {vertex:?} faces inwards and another part outwards, or the \
+                 other way round"
+            ),
+            None if sliver_count > 0 => {
+                format!(
+                    "{sliver_count} of its triangles are too narrow for a contact; merge their vertices"
+                )
+            }
+            None => return Ok(()),
+        };
+        let file = self.file;
+        let path =
+            file.path.as_ref().map(|path| format!("{}: ", path.get_ref())).unwrap_or_default();
+        let problem = format!(
+            "{path}{problem} (allowed: false, or a closed mesh of consistent winding; vertices at the same position \
+             are one)"
+        );
+        let span = file.solid.as_ref().map_or_else(|| self.span.clone(), Spanned::span);
+        self.reader.error(span, &(self.field)("solid"), problem)
     }
 
     /// Reports a wrong mesh at its path, or at a key of a mesh that is written out.

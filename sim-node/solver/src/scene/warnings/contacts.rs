@@ -89,9 +89,12 @@ impl MeshAtLoad {
         Some(Self { placed, near: NearMeshes::new(1) })
     }
 
-    /// Returns `true` if the mesh separates two points: a segment between them meets it first from opposite sides.
+    /// Returns `true` if the mesh separates two points outside any solid: a segment between them meets it first from opposite sides.
     /// One that cuts a corner off meets it from two sides that are at an angle.
     fn is_between(&mut self, from: Vec3, to: Vec3) -> bool {
+        if [from, to].into_iter().any(|end| self.placed.depth(end).is_some()) {
+            return false;
+        }
         let Some(there) = self.first_normal(from, to) else { return false };
         let Some(back) = self.first_normal(to, from) else { return false };
         there.dot(back) < OPPOSITE

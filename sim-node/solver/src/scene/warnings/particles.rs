@@ -1,6 +1,6 @@
 //! Warnings about particles.
 
-use crate::contacts::obstacle::depth_at_load;
+use crate::contacts::obstacle::SolidsAtLoad;
 use crate::scene::definition::Scene;
 use crate::scene::generate::Shape;
 use crate::scene::model::Model;
@@ -72,7 +72,10 @@ pub(super) fn inside_collider(scene: &Scene, model: &Model) -> Option<String> {
         is_fixed[*particle as usize] = true;
     }
     let free = (0..is_fixed.len()).filter(|particle| !is_fixed[*particle]);
-    let inside: Vec<_> = free.filter_map(|one| deepest_collider(scene, model, one)).collect();
+    let is_planar = scene.dimensions == 2;
+    let colliders: Vec<_> =
+        scene.colliders.iter().map(|one| SolidsAtLoad::new(one, is_planar)).collect();
+    let inside: Vec<_> = free.filter_map(|one| deepest_collider(&colliders, model, one)).collect();
     let Inside { particle, collider, depth } =
         inside.iter().rev().max_by(|a, b| a.depth.total_cmp(&b.depth))?;
     let count = match inside.len() {
@@ -87,12 +90,10 @@ pub(super) fn inside_collider(scene: &Scene, model: &Model) -> Option<String> {
 }
 
 /// Returns the collider that a particle is deepest inside of; the first of several.
-fn deepest_collider(scene: &Scene, model: &Model, particle: usize) -> Option<Inside> {
+fn deepest_collider(colliders: &[SolidsAtLoad], model: &Model, particle: usize) -> Option<Inside> {
     let position = model.particles[particle].position;
-    let is_planar = scene.dimensions == 2;
-    let depths = scene.colliders.iter().enumerate().filter_map(|(collider, one)| {
-        let depth = depth_at_load(one, position, is_planar)?;
-        Some(Inside { particle, collider, depth })
+    let depths = colliders.iter().enumerate().filter_map(|(collider, one)| {
+        Some(Inside { particle, collider, depth: one.depth(position)? })
     });
     depths.reduce(|deepest, one| if one.depth > deepest.depth { one } else { deepest })
 }

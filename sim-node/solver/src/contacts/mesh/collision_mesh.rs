@@ -1,0 +1,74 @@
+//! A mesh that particles touch.
+
+use glam::Vec3;
+
+use super::inside::{Inside, SurfacePoint};
+use super::tree::TriangleTree;
+use super::triangle::Triangle;
+use crate::contacts::bounds::Bounds;
+use crate::scene::definition::collider::ColliderMesh;
+
+/// Rounding of a position in the frame of a mesh, relative to the coordinates.
+pub(super) const TOLERANCE: f32 = 4.0 * f32::EPSILON;
+/// Height up to which a triangle is a sliver, in tolerances. The tolerance of its neighbours closes the
+/// gap that it leaves.
+const SLIVER: f32 = 2.0;
+
+/// The triangles of a mesh, ready for contacts. Immutable from load to load.
+#[derive(Debug, Default)]
+pub(crate) struct CollisionMesh {
+    pub(super) tree: TriangleTree,
+    /// Tells what is inside a solid. `None` for a mesh that is not solid.
+    pub(super) inside: Option<Inside>,
+    /// Index of the collider.
+    pub(super) collider: usize,
+    /// Largest coordinate on each axis.
+    pub(super) extents: Vec3,
+}
+
+impl CollisionMesh {
+    pub(crate) fn new(mesh: &ColliderMesh, collider: usize) -> Self {
+        let height_min = sliver_height(&mesh.vertices);
+        let corners = mesh.triangles.iter().map(|one| corners(&mesh.vertices, *one));
+        let triangles = corners.filter_map(|one| Triangle::new(one, height_min)).collect();
+        let (tree, order) = TriangleTree::new(triangles);
+        let inside = mesh.is_solid.then(|| Inside::new(mesh, &order));
+        Self { tree, inside, collider, extents: extents(&mesh.vertices) }
+    }
+
+    /// Returns the point of the surface of a solid that is nearest to a point. `tolerance` bounds the rounding of the
+    /// point. `None` if the mesh is not solid.
+    pub(super) fn surface_near(&self, point: Vec3, tolerance: f32) -> Option<SurfacePoint> {
+        self.inside.as_ref()?.surface_near(&self.tree, point, tolerance)
+    }
+
+    /// True if a point is inside a solid.
+    pub(super) fn is_inside(&self, point: Vec3, tolerance: f32) -> bool {
+        let is_near = self.inside.is_some() && self.tree.bounds().contains(point.to_array());
+        is_near && self.surface_near(point, tolerance).is_some_and(|surface| surface.height < 0.0)
+    }
+}
+
+/// Removes the triangles that are slivers: they have no normal, or none that f32 can tell. Returns
+/// their number.
+pub(crate) fn remove_slivers(mesh: &mut ColliderMesh) -> usize {
+    let ColliderMesh { vertices, triangles, .. } = mesh;
+    let (height_min, count) = (sliver_height(vertices), triangles.len());
+    triangles.retain(|one| Triangle::new(corners(vertices, *one), height_min).is_some());
+    count - triangles.len()
+}
+
+fn corners(vertices: &[[f32; 3]], triangle: [u32; 3]) -> [[f32; 3]; 3] {
+    triangle.map(|corner| vertices[corner as usize])
+}
+
+fn extents(vertices: &[[f32; 3]]) -> Vec3 {
+    let Bounds { min, max } = Bounds::around(vertices.iter().copied());
+    let extent = |axis: usize| if -min[axis] > max[axis] { -min[axis] } else { max[axis] };
+    Vec3::new(extent(0), extent(1), extent(2))
+}
+
+/// Height over the longest edge up to which a triangle is a sliver.
+fn sliver_height(vertices: &[[f32; 3]]) -> f64 {
+    f64::from(SLIVER * TOLERANCE * extents(vertices).element_sum())
+}
