@@ -138,6 +138,13 @@ fn solid(collider: &Collider, substep: &ContactSubstep) -> Option<Solid> {
     solid
 }
 
+/// The path from the start of the first one to the end of the last one. Between them, a push has changed the start, so that
+/// the displacement can hold the bounce, which the particle makes in the next substep.
+fn path_to_end(first: &SubstepPath, last: &SubstepPath) -> SubstepPath {
+    let end = last.start + last.displacement;
+    SubstepPath { start: first.start, displacement: end - first.start }
+}
+
 /// A particle and a body near it.
 struct Meeting<'a> {
     store: &'a mut ParticleStore,
@@ -171,8 +178,8 @@ impl Meeting<'_> {
         (mesh, lists): (&PlacedMesh, &mut NearMeshes),
         number: usize,
     ) {
-        let (path, _) = self.path();
-        let mut room = mesh.room(&path);
+        let (first, _) = self.path();
+        let mut room = mesh.room(&first);
         let mut triangles = mesh.list(lists, number, &room);
         if room.is_free(&triangles) {
             return;
@@ -180,19 +187,21 @@ impl Meeting<'_> {
         let mut surface = *surface;
         for push_count in 0..=PUSHES_MAX {
             let (path, inverse_mass) = self.path();
-            if !mesh.is_within(&room, &path) {
-                room = mesh.room(&path);
+            let made = if push_count == 0 { path } else { path_to_end(&first, &path) };
+            if !mesh.is_within(&room, &made) {
+                room = mesh.room(&made);
                 triangles = mesh.list(lists, number, &room);
             }
-            let stop = mesh.stop(&path, &room, &triangles, push_count);
+            let stop = mesh.stop(&made, &room, &triangles, push_count);
             if stop.is_some() && push_count == 0 {
                 self.reaction.contacts += 1;
             }
             match stop {
                 None => break,
                 Some(Stop::Hold) => {
-                    let held = mesh.held_displacement(path.start);
+                    let held = mesh.held_displacement(first.start);
                     let hit = Hit { normal: Vec3::ZERO, depth: 0.0 };
+                    let path = SubstepPath { start: first.start, ..path };
                     let contact = self.contact(&path, inverse_mass, (hit, 0.0));
                     if let Some(body) = &mut self.collider.driven {
                         let response = hold(body, &contact, held);

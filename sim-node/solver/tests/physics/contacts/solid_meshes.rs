@@ -291,3 +291,25 @@ fn a_driven_solid_and_a_particle_inside_part() {
     let speed = velocity(&solver, 0).iter().map(|axis| axis.abs()).sum();
     assert_at_most("speed", 1e-6, speed);
 }
+
+/// By the law of an elastic collision with a body of 20 times the mass.
+#[test]
+fn a_particle_bounces_off_a_driven_mesh_open_or_solid() {
+    for keys in ["", "solid = true\n"] {
+        for distance in [0.0, 0.01] {
+            let text = NO_GRAVITY.to_owned()
+                + &rates(240, 4)
+                + "[[particle]]\nposition = [0, 0.4, 0]\nvelocity = [0, -3, 0]\nmass = 0.1\n"
+                + &Mesh::cuboid([0.3; 3]).text()
+                + &format!("restitution = 1\ndistance = {distance}\n{keys}")
+                + "body = { mass = 2, inertia = [0.1, 0.1, 0.1] }\n";
+            let mut solver = solver(&text);
+            let pose = Pose { translation: [0.0; 3], rotation: [0.0, 0.0, 0.0, 1.0] };
+            for _ in 0..12 {
+                solver.drive_body(0, pose, &BodyMotion::default()).unwrap();
+                step(&mut solver, 1);
+            }
+            assert_near("speed", 3.0 * (2.0 - 0.1) / (2.0 + 0.1), velocity(&solver, 0)[1], 1e-3);
+        }
+    }
+}
