@@ -215,7 +215,7 @@ pub(crate) struct Room {
 }
 
 impl Room {
-    /// True if no path can touch any of these triangles, which are those near it, or leave a solid.
+    /// True if no contact is possible: no triangle is near, and the paths start outside.
     pub(crate) fn is_free(&self, triangles: &NearTriangles) -> bool {
         triangles.are_none() && !self.starts_inside
     }
