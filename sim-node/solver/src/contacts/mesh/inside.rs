@@ -161,7 +161,7 @@ struct Normals {
 
 /// The point of a surface that is nearest to another point.
 pub(super) struct SurfacePoint {
-    /// Unit vector out of the solid, on the line between both.
+    /// Unit vector out of the solid: on the line between both, or that of the face if they are too near.
     pub(super) normal: Vec3,
     /// Distance from the surface; negative inside.
     pub(super) height: f32,
@@ -216,7 +216,7 @@ impl Inside {
             Feature::Corner(corner) if distance > tolerance => {
                 normals.corners[corner] * self.facing
             }
-            // Near an edge or corner, the direction from it is rounding.
+            // On a face, and so near an edge or corner that the direction from it is rounding.
             _ => return Some(SurfacePoint { normal: face, height: face.dot(apart) }),
         };
         // Only the sign depends on angles, whose last digits differ between systems.
