@@ -19,6 +19,7 @@
 //!     method: 0,
 //!     particle_count: 1,
 //!     constraint_count: 0,
+//!     bend_count: 0,
 //!     solver_version: 1,
 //!     contract_version: 1,
 //!     recorder_version: "0.1.0".to_owned(),

@@ -40,9 +40,9 @@ pub use read::open::open_regular_file;
 pub use read::read_error::{LogEnd, ReadError};
 pub use read::reader::LogReader;
 pub use rows::{
-    AnchorForceRow, ColliderForceRow, ColliderRow, CollidersRow, EventRow, ForcesRow, OutcomeRow,
-    ParametersRow, ShapeRow, Softness, StatusRow, StepRow, SurfaceRow, TearsRow, TopologyRow,
-    constraint_state,
+    AnchorForceRow, BendColumns, ColliderForceRow, ColliderRow, CollidersRow, EventRow, ForcesRow,
+    OutcomeRow, ParametersRow, ShapeRow, Softness, StatusRow, StepRow, SurfaceRow, TearsRow,
+    TopologyRow, bend_state, constraint_state,
 };
 pub use run::selection::ContentSelection;
 pub use run::{CLOSING_METADATA, Closing, FORMAT_VERSION, RunDescription, SCENE_ATTACHMENT};

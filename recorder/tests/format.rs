@@ -11,7 +11,7 @@ use recorder::{
     StepRow, SurfaceRow, TearsRow, Topic, TopologyRow, Up, WriteError,
 };
 use sim_contract::{
-    Action, ColliderState, Command, ConstraintState, LoadHeader, NodeStatus, Outcome,
+    Action, BendState, ColliderState, Command, ConstraintState, LoadHeader, NodeStatus, Outcome,
     ParameterValues, ParticleState, Reason, Triangle,
 };
 
@@ -26,6 +26,7 @@ fn run() -> RunDescription {
         method: 0,
         particle_count: 2,
         constraint_count: 1,
+        bend_count: 1,
         solver_version: 1,
         contract_version: 1,
         recorder_version: "0.1.0".to_owned(),
@@ -77,11 +78,20 @@ fn colliders(step: u64) -> CollidersRow {
 fn messages() -> Vec<Message> {
     let load = LoadHeader { particle_count: 2, rate_hz: 240, ..LoadHeader::default() };
     let constraint = ConstraintState { a: 0, b: 1, rest_length: 0.1, compliance: 1e-7, kind: 2 };
+    let bend = BendState {
+        particles: [0, 1, 0, 1],
+        coefficients: [0.5, -1.5, 1.0, 0.0],
+        geometry: 1e-3,
+        rigidity: 0.02,
+        rest: 0.0,
+        shape: 2,
+        block: -1,
+    };
     let mut status = NodeStatus { step: 3, real_time_factor: 0.999, ..NodeStatus::default() };
     status.set_scene_name("two points");
     let [rejected, applied] = outcomes();
     let mut messages = vec![
-        Message::Topology(TopologyRow::new(&load, &[constraint])),
+        Message::Topology(TopologyRow::new(&load, &[constraint], &[bend])),
         Message::Surface(SurfaceRow::new(&load, &[Triangle { corners: [0, 1, 0] }])),
         Message::Colliders(colliders(2)),
         Message::Tears(TearsRow { step: 2, constraints: vec![0], causes: vec!["cut".to_owned()] }),
@@ -183,7 +193,7 @@ fn rows_have_the_documented_form() {
     let Message::Topology(topology) = &messages()[0] else { panic!("not the topology") };
     assert_eq!(
         serde_json::to_string(topology).unwrap(),
-        r#"{"step":0,"revision":0,"a":[0],"b":[1],"rest_length":[0.1],"compliance":[1e-7],"kind":[2],"torn":[]}"#
+        r#"{"step":0,"revision":0,"a":[0],"b":[1],"rest_length":[0.1],"compliance":[1e-7],"kind":[2],"torn":[],"bends":{"particles":[0,1,0,1],"coefficients":[0.5,-1.5,1.0,0.0],"geometry":[0.001],"rigidity":[0.02],"rest":[0.0],"shape":[2],"block":[-1]}}"#
     );
 }
 
@@ -207,15 +217,15 @@ fn the_other_rows_have_the_documented_form() {
 fn recordings_of_older_formats_are_read_and_those_of_the_next_are_refused() {
     let with_version = |version: &str| {
         let mut file = write(LogOptions::default());
-        let needle = b"format_version\x01\0\0\x005";
+        let needle = b"format_version\x01\0\0\x006";
         let place = file.windows(needle.len()).position(|window| window == needle).unwrap();
         file[place + needle.len() - 1] = version.as_bytes()[0];
         LogReader::new(Cursor::new(file)).map(|_| ())
     };
-    assert!(["1", "2", "3", "4"].iter().all(|version| with_version(version).is_ok()));
+    assert!(["1", "2", "3", "4", "5"].iter().all(|version| with_version(version).is_ok()));
     assert_eq!(
-        with_version("6").unwrap_err().to_string(),
-        "has format version 6; this recorder reads versions 1 to 5"
+        with_version("7").unwrap_err().to_string(),
+        "has format version 7; this recorder reads versions 1 to 6"
     );
 }
 

@@ -26,6 +26,7 @@ fn written() -> Vec<u8> {
         method: 0,
         particle_count: 4,
         constraint_count: 0,
+        bend_count: 0,
         solver_version: 1,
         contract_version: 1,
         recorder_version: "0.1.0".to_owned(),

@@ -120,7 +120,7 @@ fn topology(solver: &Solver) -> Message {
             kind: one.kind as u32,
         })
         .collect();
-    Message::Topology(TopologyRow::new(&LoadHeader::default(), &constraints))
+    Message::Topology(TopologyRow::new(&LoadHeader::default(), &constraints, &[]))
 }
 
 fn written(style: Style) -> (Vec<u8>, Vec<Expected>) {
@@ -137,6 +137,7 @@ fn written(style: Style) -> (Vec<u8>, Vec<Expected>) {
         method: 0,
         particle_count: 36,
         constraint_count: u32::try_from(solver.constraint_count()).unwrap(),
+        bend_count: u32::try_from(solver.bend_count()).unwrap(),
         solver_version: 1,
         contract_version: 1,
         recorder_version: "0.1.0".to_owned(),

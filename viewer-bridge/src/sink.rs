@@ -7,7 +7,9 @@ use std::fmt::Debug;
 use std::sync::Arc;
 
 use recorder::{OutcomeRow, StatusRow, StepRow};
-use sim_contract::{ConstraintState, Forces, LoadHeader, ParticleState, TornConstraint, Triangle};
+use sim_contract::{
+    BendState, ConstraintState, Forces, LoadHeader, ParticleState, TornConstraint, Triangle,
+};
 
 use crate::message::{
     GhostText, Level, Node, OutcomeText, ParametersText, Playback, Timeline, Undoable,
@@ -89,6 +91,8 @@ pub struct Topology<'a> {
     pub header: &'a LoadHeader,
     /// Constraints in the order of their indices.
     pub constraints: &'a [ConstraintState],
+    /// Bends in the order of their indices.
+    pub bends: &'a [BendState],
     /// Triangles of the surface.
     pub triangles: &'a [Triangle],
 }

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use anyhow::Context;
 use recorder::{
     AfterEnd, Finding, LoadRows, PartFile, ReadError, RepairReport, SCENE_ATTACHMENT, SurfaceRow,
-    Topic, TopologyRow, constraint_state, open_regular_file, repair_file,
+    Topic, TopologyRow, bend_state, constraint_state, open_regular_file, repair_file,
 };
 use serde::Serialize;
 use sim_contract::{LoadHeader, Stop, Triangle, is_being_written, printable_line};
@@ -137,7 +137,8 @@ fn lost_load(report: &RepairReport) -> Option<LoadRows> {
     let constraints: Vec<_> = solver.constraints().map(constraint_state).collect();
     let triangles: Vec<_> =
         solver.triangles().iter().map(|corners| Triangle { corners: *corners }).collect();
-    let topology = TopologyRow::new(&header, &constraints);
+    let bends: Vec<_> = solver.bends().map(bend_state).collect();
+    let topology = TopologyRow::new(&header, &constraints, &bends);
     Some(LoadRows {
         topology: TopologyRow { torn: lost.torn.clone(), ..topology },
         surface: SurfaceRow::new(&header, &triangles),

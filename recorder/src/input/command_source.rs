@@ -91,6 +91,7 @@ mod tests {
             method: 0,
             particle_count: 0,
             constraint_count: 0,
+            bend_count: 0,
             solver_version: 1,
             contract_version: 1,
             recorder_version: "0.1.0".to_owned(),

@@ -19,4 +19,4 @@ pub use parameters::ParametersRow;
 pub use status::StatusRow;
 pub use step::StepRow;
 pub use tears::TearsRow;
-pub use topology::{Softness, SurfaceRow, TopologyRow, constraint_state};
+pub use topology::{BendColumns, Softness, SurfaceRow, TopologyRow, bend_state, constraint_state};

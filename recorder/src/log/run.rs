@@ -18,8 +18,9 @@ use super::topic::{AllCounts, Topic, TopicCounts};
 /// `/topology`. Version 3 added `/parameters`. Version 4 added the index of each snapshot in `/steps`,
 /// `force` and `disconnected` in `/outcomes`, and the number of unreadable messages at the end. Version 5
 /// made `/keyframe` a protobuf message, turned `/tf` by the scene's `up`, counts `/tf`, gives each
-/// snapshot a time of reception of its own, and has schemas that Foxglove viewers accept.
-pub const FORMAT_VERSION: u32 = 5;
+/// snapshot a time of reception of its own, and has schemas that Foxglove viewers accept. Version 6 added the
+/// bends in `/topology`, and their number.
+pub const FORMAT_VERSION: u32 = 6;
 /// Oldest version that this recorder reads. Missing fields have defaults.
 pub(super) const FORMAT_VERSION_MIN: u32 = 1;
 
@@ -62,6 +63,8 @@ pub struct RunDescription {
     pub particle_count: u32,
     /// Number of constraints in the scene.
     pub constraint_count: u32,
+    /// Number of bends in the scene. 0 in recordings of format 5 and earlier, which do not say.
+    pub bend_count: u32,
     /// Version of the solver's arithmetic.
     pub solver_version: u32,
     /// Version of the node's messages (the contract).
@@ -120,6 +123,7 @@ impl RunDescription {
                 ("method", self.method_name().to_owned()),
                 ("particle_count", self.particle_count.to_string()),
                 ("constraint_count", self.constraint_count.to_string()),
+                ("bend_count", self.bend_count.to_string()),
                 ("solver_version", self.solver_version.to_string()),
                 ("contract_version", self.contract_version.to_string()),
                 ("recorder_version", self.recorder_version.clone()),
@@ -150,6 +154,10 @@ impl RunDescription {
             method: u32::from(text(map, "method")? != "xpbd"),
             particle_count: element_count(map, "particle_count")?,
             constraint_count: element_count(map, "constraint_count")?,
+            bend_count: match map.get("bend_count") {
+                Some(_) => element_count(map, "bend_count")?,
+                None => 0,
+            },
             solver_version: parsed(map, "solver_version")?,
             contract_version: parsed(map, "contract_version")?,
             recorder_version: text(map, "recorder_version")?.to_owned(),
@@ -273,6 +281,7 @@ mod tests {
             method: 1,
             particle_count: 3,
             constraint_count: 2,
+            bend_count: 6,
             solver_version: 7,
             contract_version: 8,
             recorder_version: "0.1.0".to_owned(),

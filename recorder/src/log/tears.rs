@@ -201,7 +201,7 @@ mod tests {
         let causes = |torn: &[u32], bytes: Vec<u8>| {
             let topology = TopologyRow {
                 torn: torn.to_vec(),
-                ..TopologyRow::new(&sim_contract::LoadHeader::default(), &[])
+                ..TopologyRow::new(&sim_contract::LoadHeader::default(), &[], &[])
             };
             let first = Frame {
                 updates: vec![Message::Keyframe { step: 1, bytes }],

@@ -31,7 +31,8 @@ use crate::proof_tests::{ALL, finish};
 use crate::simulation::{Job, States, simulate};
 use crate::verification::{Verdict, verify};
 
-/// A scene whose recording has every topic: a particle that freezes, a cut, and a moving collider.
+/// A scene whose recording has every topic: a particle that freezes, a cut, a moving collider,
+/// and bends.
 const SCENE: &str = "
     version = 1
     name = 'edits'
@@ -52,6 +53,10 @@ const SCENE: &str = "
     rows = 2
     spacing = 0.5
     pinned = 'top'
+    bending = 1e-3
+    [[bend]]
+    particles = [0, 2, 3]
+    rigidity = 0.5
     [[collider]]
     shape = 'sphere'
     center = [0, 20, 0]

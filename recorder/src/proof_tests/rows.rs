@@ -1,7 +1,7 @@
 //! The rows besides the snapshots: tears with their causes, colliders and events match the
 //! simulation, and a changed row is reported.
 
-use crate::log::{Message, TearsRow, TopologyRow};
+use crate::log::{BendColumns, Message, TearsRow, TopologyRow};
 use sim_contract::ParticleFlags;
 
 use super::commands::{COMMANDS, SCENE, STEPS, collect, job, job_of};
@@ -13,6 +13,37 @@ fn tears(file: &[u8]) -> Vec<TearsRow> {
         Message::Tears(row) => Some(row.clone()),
         _ => None,
     })
+}
+
+#[test]
+fn bends_that_are_not_those_of_the_scene_are_found() {
+    let (file, _) = record(&job(COMMANDS));
+    let changed = |change: fn(&mut BendColumns)| {
+        let file = rebuild(&file, |message| match message {
+            Message::Topology(mut row) => {
+                change(&mut row.bends);
+                Some(Message::Topology(row))
+            }
+            other => Some(other),
+        });
+        check(&file).0.to_string()
+    };
+    assert!(!changed(|_| {}).contains("/topology"));
+    let changes: [fn(&mut BendColumns); 7] = [
+        |bends| bends.particles[4 * 3] ^= 1,
+        |bends| bends.coefficients[4 * 3].0 += 0.5,
+        |bends| bends.geometry[3].0 += 0.5,
+        |bends| bends.rigidity[3].0 += 0.5,
+        |bends| bends.rest[3].0 += 0.5,
+        |bends| bends.shape[3] += 1,
+        |bends| bends.block[3] += 1,
+    ];
+    for change in changes {
+        let report = changed(change);
+        assert!(report.contains("/topology: bend 3 is not that of the scene"), "{report}");
+    }
+    let report = changed(|bends| bends.shape.truncate(3));
+    assert!(report.contains("/topology: the columns of its bends differ in length"), "{report}");
 }
 
 #[test]

@@ -51,6 +51,7 @@ impl Job {
             method: self.scene.solver.method as u32,
             particle_count: count(solver.particle_count()),
             constraint_count: count(solver.constraint_count()),
+            bend_count: count(solver.bend_count()),
             solver_version: SOLVER_VERSION,
             contract_version: CONTRACT_VERSION,
             recorder_version: env!("CARGO_PKG_VERSION").to_owned(),

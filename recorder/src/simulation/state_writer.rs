@@ -4,7 +4,7 @@ use std::io::Write;
 
 use crate::log::{
     CollidersRow, LogWriter, Message, OutcomeRow, ParametersRow, RunDescription, StepRow,
-    SurfaceRow, TopologyRow, WriteError, constraint_state,
+    SurfaceRow, TopologyRow, WriteError, bend_state, constraint_state,
 };
 use sim_contract::{LoadHeader, ParameterValues, ParticleState, Triangle};
 use sim_solver::Solver;
@@ -51,7 +51,8 @@ impl<'a, W: Write> StateWriter<'a, W> {
         let constraints: Vec<_> = loaded.constraints().map(constraint_state).collect();
         let triangles: Vec<_> =
             solver.triangles().iter().map(|corners| Triangle { corners: *corners }).collect();
-        let topology = TopologyRow::new(&header, &constraints);
+        let bends: Vec<_> = loaded.bends().map(bend_state).collect();
+        let topology = TopologyRow::new(&header, &constraints, &bends);
         let topology = TopologyRow { torn: solver.torn().to_vec(), ..topology };
         log.write(&Message::Topology(topology), 0)?;
         log.write(&Message::Surface(SurfaceRow::new(&header, &triangles)), 0)?;

@@ -237,11 +237,11 @@ impl Verification {
             if let Message::Topology(row) = row {
                 self.revision = Some(row.revision);
             }
-            if let Some(what) = compare_load(row, run, &solver) {
+            if let Some(what) = compare_load(row, run, self.format_version, &solver) {
                 return Some(what);
             }
         }
-        compare_counts(run, &solver)
+        compare_counts(run, self.format_version, &solver)
     }
 
     /// Checks the fields of tears and outcomes on which no state depends.

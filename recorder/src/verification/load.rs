@@ -5,7 +5,14 @@ use std::io::Read;
 use sim_contract::{LoadHeader, Triangle};
 use sim_solver::{Scene, Solver};
 
-use crate::log::{LogReader, Message, RunDescription, SurfaceRow, TopologyRow, constraint_state};
+use crate::log::{
+    LogReader, Message, RunDescription, SurfaceRow, TopologyRow, bend_state, constraint_state,
+};
+
+/// First version of the format that says which axis of the scene points up.
+const TURNED_VERSION: u32 = 5;
+/// First version of the format that has the bends.
+const BENDS_VERSION: u32 = 6;
 
 /// Compares the metadata of the run with the scene. Returns a description of the first difference.
 pub(super) fn compare_run<R: Read>(log: &LogReader<R>, scene: &Scene) -> Option<String> {
@@ -20,7 +27,7 @@ pub(super) fn compare_run<R: Read>(log: &LogReader<R>, scene: &Scene) -> Option<
         ("scene", run.scene_name == scene.name),
         ("origin", is_same_origin),
         // Older formats do not say.
-        ("up", run.up == scene.up || !log.is_current_format()),
+        ("up", run.up == scene.up || log.format_version() < TURNED_VERSION),
         ("rate_hz", run.rate_hz == scene.solver.rate_hz),
         ("method", run.method == scene.solver.method as u32),
     ];
@@ -29,10 +36,16 @@ pub(super) fn compare_run<R: Read>(log: &LogReader<R>, scene: &Scene) -> Option<
 }
 
 /// Compares the metadata of the run with the elements of the scene.
-pub(super) fn compare_counts(run: &RunDescription, solver: &Solver) -> Option<String> {
+pub(super) fn compare_counts(
+    run: &RunDescription,
+    format_version: u32,
+    solver: &Solver,
+) -> Option<String> {
+    let bend_count = if format_version < BENDS_VERSION { 0 } else { solver.bend_count() };
     let counts = [
         ("particle_count", run.particle_count, solver.particle_count()),
         ("constraint_count", run.constraint_count, solver.constraint_count()),
+        ("bend_count", run.bend_count, bend_count),
     ];
     let is_other = |(_, recorded, expected): &(_, u32, usize)| *recorded as usize != *expected;
     let (name, recorded, expected) = counts.into_iter().find(is_other)?;
@@ -43,10 +56,11 @@ pub(super) fn compare_counts(run: &RunDescription, solver: &Solver) -> Option<St
 pub(super) fn compare_load(
     message: &Message,
     run: &RunDescription,
+    format_version: u32,
     solver: &Solver,
 ) -> Option<String> {
     match message {
-        Message::Topology(row) => compare_topology(row, run, solver),
+        Message::Topology(row) => compare_topology(row, run, format_version, solver),
         Message::Surface(row) => {
             let triangles: Vec<_> =
                 solver.triangles().iter().map(|corners| Triangle { corners: *corners }).collect();
@@ -58,7 +72,12 @@ pub(super) fn compare_load(
     }
 }
 
-fn compare_topology(row: &TopologyRow, run: &RunDescription, solver: &Solver) -> Option<String> {
+fn compare_topology(
+    row: &TopologyRow,
+    run: &RunDescription,
+    format_version: u32,
+    solver: &Solver,
+) -> Option<String> {
     let header = LoadHeader {
         step: row.step,
         topology_revision: row.revision,
@@ -66,8 +85,13 @@ fn compare_topology(row: &TopologyRow, run: &RunDescription, solver: &Solver) ->
         ..LoadHeader::default()
     };
     let constraints: Vec<_> = solver.constraints().map(constraint_state).collect();
+    let bends: Vec<_> = if format_version < BENDS_VERSION {
+        Vec::new()
+    } else {
+        solver.bends().map(bend_state).collect()
+    };
     let expected =
-        TopologyRow { torn: row.torn.clone(), ..TopologyRow::new(&header, &constraints) };
+        TopologyRow { torn: row.torn.clone(), ..TopologyRow::new(&header, &constraints, &bends) };
     if *row == expected {
         return None;
     }
@@ -75,8 +99,14 @@ fn compare_topology(row: &TopologyRow, run: &RunDescription, solver: &Solver) ->
     let (Some(found), Some(expected)) = (found, expected) else {
         return Some("/topology: its columns differ in length".to_owned());
     };
-    let place = first_difference(&found, &expected).unwrap_or_default();
-    Some(format!("/topology: constraint {place} is not that of the scene"))
+    if let Some(place) = first_difference(&found, &expected) {
+        return Some(format!("/topology: constraint {place} is not that of the scene"));
+    }
+    let Some(found) = row.bends() else {
+        return Some("/topology: the columns of its bends differ in length".to_owned());
+    };
+    let place = first_difference(&found, &bends).unwrap_or_default();
+    Some(format!("/topology: bend {place} is not that of the scene"))
 }
 
 /// Returns the first place where two lists differ.

@@ -124,6 +124,7 @@ fn run(solver: &Solver, rate_hz: u32) -> RunDescription {
         method: 0,
         particle_count: u32::try_from(solver.particle_count()).unwrap(),
         constraint_count: u32::try_from(solver.constraint_count()).unwrap(),
+        bend_count: u32::try_from(solver.bend_count()).unwrap(),
         solver_version: SOLVER_VERSION,
         contract_version: 4,
         recorder_version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -145,7 +146,7 @@ fn simulate(scene: &Scene) -> Vec<Message> {
         })
         .collect();
     let mut messages = vec![
-        Message::Topology(TopologyRow::new(&header, &constraints)),
+        Message::Topology(TopologyRow::new(&header, &constraints, &[])),
         Message::Surface(SurfaceRow::new(&header, &[])),
     ];
     let mut outcome_count = 0;

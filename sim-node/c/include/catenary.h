@@ -17,7 +17,7 @@
 
 #include <stddef.h>
 #include <stdint.h>
-#define CATENARY_CONTRACT_VERSION 4  // version of the layouts of this header
+#define CATENARY_CONTRACT_VERSION 5  // version of the layouts of this header
 #define CATENARY_MEMBERS_MAX 16  // most members of the lockstep
 #define CATENARY_MEMBER_CHANGES_KEPT 32  // changes that a status names
 #define CATENARY_TEXT_SIZE_BYTES_MAX 160  // longest text of a command
@@ -450,7 +450,7 @@ typedef struct {
   uint32_t snapshot_index;
 } catenary_snapshot_header;
 
-// Header of `topology`, `surface` and `scene`: 72 bytes, alignment 8. Written once per load.
+// Header of `topology`, `bends`, `surface` and `scene`: 72 bytes, alignment 8. Written once per load.
 typedef struct {
   // Same as in `catenary_snapshot_header`.
   uint64_t run_id;
@@ -462,7 +462,7 @@ typedef struct {
   double origin[3];
   // Same as in `catenary_snapshot_header`.
   uint32_t topology_revision;
-  // Length of the payload in constraints, triangles or bytes.
+  // Length of the payload in constraints, bends, triangles or bytes.
   uint32_t count;
   // Number of particles in the scene.
   uint32_t particle_count;
@@ -498,6 +498,40 @@ typedef struct {
   // Number of constraints.
   size_t constraint_count;
 } catenary_topology;
+
+// A bend: 52 bytes, alignment 4; an element of `bends`. Its position there is its index. It does not
+// change until the next load, and never tears; it stops acting once a constraint of its path is torn.
+//
+// With C the sum of c x over its particles, its energy in J is |C - rest n|^2 / (2 alpha), where
+// alpha = `geometry` / rigidity is its compliance in m/N, and n the unit vector along the sum of the unit
+// normals of the two triangles of a hinge. `set bending` replaces the rigidity.
+typedef struct {
+  // Indices of the particles. The fourth of a bend of three is its second one again.
+  uint32_t particles[4];
+  // Coefficients c of the particles; their sum is 0. The fourth of a bend of three is 0.
+  float coefficients[4];
+  // Compliance times rigidity: m^2 on a surface, m^3 on a line.
+  float geometry;
+  // Bending rigidity of the scene: N m on a surface, N m^2 on a line.
+  float rigidity;
+  // C along n at rest, in m. Other than 0 only for a hinge that is folded at rest.
+  float rest;
+  // 0 three particles on a line, 1 the corners of a cell, which it keeps from twisting, 2 a hinge: a third
+  // corner, the ends of the edge, and the other third corner of two triangles.
+  uint32_t shape;
+  // Index of the `[[generate]]` block that it comes from; -1 for an explicit bend.
+  int32_t block;
+} catenary_bend_state;
+
+// The bends of a load, borrowed from the client. A scene without bends has none.
+typedef struct {
+  // Header of the load.
+  catenary_load_header header;
+  // The bends, by index.
+  const catenary_bend_state *bends;
+  // Number of bends.
+  size_t bend_count;
+} catenary_bends;
 
 // A triangle of the surface: 12 bytes, alignment 4; an element of `surface`.
 typedef struct {
@@ -973,6 +1007,11 @@ catenary_result catenary_read_topology(catenary_client *client,
                                        double timeout_s,
                                        catenary_topology *topology);
 
+// Reads the newest bends, like `catenary_read_topology`.
+catenary_result catenary_read_bends(catenary_client *client,
+                                    double timeout_s,
+                                    catenary_bends *bends);
+
 // Reads the newest surface, like `catenary_read_topology`.
 catenary_result catenary_read_surface(catenary_client *client,
                                       double timeout_s,
@@ -1092,6 +1131,7 @@ typedef char catenary_check_snapshot_header[sizeof(catenary_snapshot_header) == 
 typedef char catenary_check_particle_state[sizeof(catenary_particle_state) == 32 ? 1 : -1];
 typedef char catenary_check_load_header[sizeof(catenary_load_header) == 72 ? 1 : -1];
 typedef char catenary_check_constraint_state[sizeof(catenary_constraint_state) == 20 ? 1 : -1];
+typedef char catenary_check_bend_state[sizeof(catenary_bend_state) == 52 ? 1 : -1];
 typedef char catenary_check_triangle[sizeof(catenary_triangle) == 12 ? 1 : -1];
 typedef char catenary_check_tears_header[sizeof(catenary_tears_header) == 32 ? 1 : -1];
 typedef char catenary_check_torn_constraint[sizeof(catenary_torn_constraint) == 8 ? 1 : -1];

@@ -8,7 +8,8 @@ use std::time::Duration;
 
 use sim_contract::clock::monotonic_ns;
 use sim_contract::{
-    Client, ColliderState, ConstraintState, ForceRow, ParameterState, TornConstraint, Triangle,
+    BendState, Client, ColliderState, ConstraintState, ForceRow, ParameterState, TornConstraint,
+    Triangle,
 };
 
 use crate::handles::Handles;
@@ -37,6 +38,7 @@ pub(crate) struct Attached {
 #[derive(Debug, Default)]
 pub(crate) struct Lists {
     pub(crate) topology: Vec<ConstraintState>,
+    pub(crate) bends: Vec<BendState>,
     pub(crate) surface: Vec<Triangle>,
     pub(crate) torn: Vec<TornConstraint>,
     pub(crate) parameters: Vec<ParameterState>,

@@ -4,8 +4,8 @@ use std::ffi::{CString, c_char};
 use std::mem::MaybeUninit;
 
 use sim_contract::{
-    ColliderState, CollidersHeader, ConstraintState, LoadHeader, NodeStatus, ParameterState,
-    ParametersHeader, TearsHeader, TornConstraint, Triangle,
+    BendState, ColliderState, CollidersHeader, ConstraintState, LoadHeader, NodeStatus,
+    ParameterState, ParametersHeader, TearsHeader, TornConstraint, Triangle,
 };
 
 use crate::attached::{ClientHandle, with_client};
@@ -22,6 +22,18 @@ pub struct Topology {
     pub constraints: *const ConstraintState,
     /// Number of constraints.
     pub constraint_count: usize,
+}
+
+/// The bends of a load, borrowed from the client. A scene without bends has none.
+#[derive(Debug)]
+#[repr(C)]
+pub struct Bends {
+    /// Header of the load.
+    pub header: LoadHeader,
+    /// The bends, by index.
+    pub bends: *const BendState,
+    /// Number of bends.
+    pub bend_count: usize,
 }
 
 /// The triangles of a load, borrowed from the client. A scene without a surface has none.
@@ -89,6 +101,25 @@ pub extern "C" fn catenary_read_topology(
         let list = &attached.lists.topology;
         let (constraints, constraint_count) = (list.as_ptr(), list.len());
         write(topology, Topology { header: read.header, constraints, constraint_count }, "topology")
+    })
+}
+
+/// Reads the newest bends, like `catenary_read_topology`.
+#[unsafe(no_mangle)]
+pub extern "C" fn catenary_read_bends(
+    client: *mut ClientHandle,
+    timeout_s: f64,
+    bends: Option<&mut MaybeUninit<Bends>>,
+) -> CatenaryResult {
+    with_client(client, |attached| {
+        check_place(bends.as_deref(), "bends")?;
+        let timeout = timeout(timeout_s)?;
+        let read = attached.client.bends(timeout)?;
+        let read = read.ok_or_else(|| attached.nothing(timeout))?;
+        attached.lists.bends = read.bends;
+        let list = &attached.lists.bends;
+        let (pointer, bend_count) = (list.as_ptr(), list.len());
+        write(bends, Bends { header: read.header, bends: pointer, bend_count }, "bends")
     })
 }
 

@@ -11,19 +11,20 @@ use cbindgen::{
     Builder, Config, DocumentationStyle, EnumConfig, ItemType, Language, RenameRule, Style,
 };
 use sim_contract::{
-    CONTRACT_VERSION, ColliderState, CollidersHeader, CommandOptions, ConstraintState, ForceRow,
-    ForcesHeader, LoadHeader, MEMBER_CHANGES_KEPT, MEMBERS_MAX, NodeStatus, OUTCOME_FLAG_CONTROL,
-    OUTCOME_FLAG_DISCONNECTED, OUTCOME_FLAG_NEW_RUN, Outcome, ParameterState, ParametersHeader,
-    ParticleFlags, ParticleState, SnapshotFlags, SnapshotHeader, StatusFlags, TearsHeader, Text,
-    TornConstraint, Triangle,
+    BendState, CONTRACT_VERSION, ColliderState, CollidersHeader, CommandOptions, ConstraintState,
+    ForceRow, ForcesHeader, LoadHeader, MEMBER_CHANGES_KEPT, MEMBERS_MAX, NodeStatus,
+    OUTCOME_FLAG_CONTROL, OUTCOME_FLAG_DISCONNECTED, OUTCOME_FLAG_NEW_RUN, Outcome, ParameterState,
+    ParametersHeader, ParticleFlags, ParticleState, SnapshotFlags, SnapshotHeader, StatusFlags,
+    TearsHeader, Text, TornConstraint, Triangle,
 };
 
 /// Types with their names in the header. The last ones are in no signature: numbers in messages.
-const TYPES: [(&str, &str); 38] = [
+const TYPES: [(&str, &str); 40] = [
     ("CatenaryResult", "catenary_result"),
     ("ClientHandle", "catenary_client"),
     ("Snapshot", "catenary_snapshot"),
     ("Topology", "catenary_topology"),
+    ("Bends", "catenary_bends"),
     ("Surface", "catenary_surface"),
     ("Torn", "catenary_torn"),
     ("Parameters", "catenary_parameters"),
@@ -33,6 +34,7 @@ const TYPES: [(&str, &str); 38] = [
     ("SnapshotHeader", "catenary_snapshot_header"),
     ("ParticleState", "catenary_particle_state"),
     ("ConstraintState", "catenary_constraint_state"),
+    ("BendState", "catenary_bend_state"),
     ("Triangle", "catenary_triangle"),
     ("LoadHeader", "catenary_load_header"),
     ("TearsHeader", "catenary_tears_header"),
@@ -168,6 +170,7 @@ fn checks() -> String {
     add("particle_state", size_of::<ParticleState>());
     add("load_header", size_of::<LoadHeader>());
     add("constraint_state", size_of::<ConstraintState>());
+    add("bend_state", size_of::<BendState>());
     add("triangle", size_of::<Triangle>());
     add("tears_header", size_of::<TearsHeader>());
     add("torn_constraint", size_of::<TornConstraint>());

@@ -65,6 +65,7 @@ fn every_call_of_a_detached_client_is_refused() {
             catenary_next_snapshot(client, 0.0, None),
             catenary_latest_snapshot(client, 0.0, None),
             catenary_read_topology(client, 0.0, None),
+            catenary_read_bends(client, 0.0, None),
             catenary_read_surface(client, 0.0, None),
             catenary_read_torn(client, 0.0, None),
             catenary_read_parameters(client, 0.0, None),

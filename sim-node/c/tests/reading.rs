@@ -60,6 +60,9 @@ fn every_list_arrives() {
     let expected = [ConstraintState { b: 1, rest_length: 0.5, ..ConstraintState::default() }];
     assert_eq!(list(topology.constraints, topology.constraint_count), expected);
     assert_eq!((topology.header.run_id, topology.header.particle_count), (RUN_ID, 2));
+    let bends = read(&owner, client, catenary_read_bends);
+    assert_eq!(list(bends.bends, bends.bend_count), [BEND]);
+    assert_eq!(bends.header.particle_count, 2);
     let surface = read(&owner, client, catenary_read_surface);
     assert_eq!(list(surface.triangles, surface.triangle_count), [Triangle { corners: [0, 1, 1] }]);
     let read_torn = read(&owner, client, catenary_read_torn);

@@ -21,7 +21,7 @@ use crate::client::forces::{ForcesReader, Search};
 use crate::client::lockstep::{LockstepError, Member};
 use crate::client::request::{Commander, RequestError, random_client_id};
 use crate::client::torn::Torn;
-use crate::client::views::{Colliders, Forces, Parameters, Snapshot, Surface, Topology};
+use crate::client::views::{Bends, Colliders, Forces, Parameters, Snapshot, Surface, Topology};
 use crate::client::watch::Watch;
 use crate::endpoint::Endpoint;
 use crate::messages::collider::{ColliderState, CollidersHeader};
@@ -31,11 +31,11 @@ use crate::messages::parameters::{ParameterState, ParametersHeader};
 use crate::messages::snapshot::{ParticleState, SnapshotHeader};
 use crate::messages::status::NodeStatus;
 use crate::messages::tears::{TearsHeader, TornConstraint};
-use crate::messages::topology::{ConstraintState, LoadHeader, Triangle};
+use crate::messages::topology::{BendState, ConstraintState, LoadHeader, Triangle};
 use crate::ports::latch::Latch;
 use crate::ports::reader::{ReadError, SliceReader, ValueReader};
 use crate::ports::service::{
-    COLLIDERS, PARAMETERS, PARTICLES, SCENE, STATUS, SURFACE, ServiceError, TEARS, TOPOLOGY,
+    BENDS, COLLIDERS, PARAMETERS, PARTICLES, SCENE, STATUS, SURFACE, ServiceError, TEARS, TOPOLOGY,
 };
 use crate::ports::services::{AttachError, Attachment};
 use sim_types::{Action, CLIENT_ID_END};
@@ -54,6 +54,7 @@ pub struct Client {
     watch: Watch,
     particles: Option<SliceReader<ParticleState, SnapshotHeader>>,
     topology: Option<Latch<ConstraintState, LoadHeader>>,
+    bends: Option<Latch<BendState, LoadHeader>>,
     surface: Option<Latch<Triangle, LoadHeader>>,
     scene: Option<Latch<u8, LoadHeader>>,
     tears: Option<Latch<TornConstraint, TearsHeader>>,
@@ -95,6 +96,7 @@ impl Client {
             watch: Watch::default(),
             particles: None,
             topology: None,
+            bends: None,
             surface: None,
             scene: None,
             tears: None,
@@ -147,6 +149,21 @@ impl Client {
             Ok(latch.newest(&self.attachment)?.map(|sample| Topology {
                 header: *sample.user_header(),
                 constraints: sample.payload().to_vec(),
+            }))
+        })
+    }
+
+    /// Returns the newest bends, like [`Client::topology`]. A scene without bends has an empty list.
+    ///
+    /// # Errors
+    /// Same as [`Client::topology`].
+    pub fn bends(&mut self, timeout: Duration) -> Result<Option<Bends>, ReadError> {
+        let service = &self.attachment.services.bends;
+        let latch = get_or_create(&mut self.bends, || Latch::create(service, &BENDS))?;
+        self.watch.wait_for(&self.attachment, timeout, || {
+            Ok(latch.newest(&self.attachment)?.map(|sample| Bends {
+                header: *sample.user_header(),
+                bends: sample.payload().to_vec(),
             }))
         })
     }

@@ -30,7 +30,7 @@
 //! |---|---|---|
 //! | particles | [`ParticleState`]s; [`SnapshotHeader`] | after every step; with `--every n` after every n-th, and the last one before a pause |
 //! | keyframe | bytes; [`KeyframeHeader`] | per load, when a reader joins, after commands except `move`, and every second: the state that particles lack |
-//! | scene, topology, surface | TOML, [`ConstraintState`]s, [`Triangle`]s; [`LoadHeader`] | once per load |
+//! | scene, topology, bends, surface | TOML, [`ConstraintState`]s, [`BendState`]s, [`Triangle`]s; [`LoadHeader`] | once per load |
 //! | colliders | [`ColliderState`]s; [`CollidersHeader`] | per load, on a change, and each step while one moves |
 //! | tears | [`TornConstraint`]s; [`TearsHeader`] | per load, on a tear and on a reset: all constraints torn since |
 //! | parameters | [`ParameterState`]s; [`ParametersHeader`] | per load and on a change: all values |
@@ -65,7 +65,7 @@ pub use client::restoring::SentState;
 pub use client::state::State;
 pub use client::tap::Tap;
 pub use client::torn::Torn;
-pub use client::views::{Colliders, Forces, Parameters, Snapshot, Surface, Topology};
+pub use client::views::{Bends, Colliders, Forces, Parameters, Snapshot, Surface, Topology};
 pub use domain::Domain;
 pub use domain::config_file::{ConfigFile, ConfigFileError};
 pub use domain::nodes::{ListedNode, NodeAnswer};
@@ -89,7 +89,7 @@ pub use messages::restore::{GivenState, ReceivedState, RestoreHeader, scene_hash
 pub use messages::snapshot::{ParticleState, SnapshotFlags, SnapshotHeader};
 pub use messages::status::{MemberStatus, NodeStatus, StatusFlags};
 pub use messages::tears::{TearsHeader, TornConstraint};
-pub use messages::topology::{ConstraintState, KeyframeHeader, LoadHeader, Triangle};
+pub use messages::topology::{BendState, ConstraintState, KeyframeHeader, LoadHeader, Triangle};
 pub use messages::update::Update;
 pub use owner::Owner;
 pub use owner::error::OwnerError;

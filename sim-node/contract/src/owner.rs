@@ -85,7 +85,7 @@ pub struct Owner {
 const WAKES_PER_READER: u32 = 2;
 
 impl Owner {
-    /// Claims the name, creates its services and publishes scene, topology, surface, parameters and an
+    /// Claims the name, creates its services and publishes scene, topology, bends, surface, parameters and an
     /// empty list of tears. For a scene without colliders, also publishes an empty list of colliders.
     ///
     /// # Errors
@@ -425,6 +425,7 @@ mod tests {
             header: LoadHeader { topology_revision, ..LoadHeader::default() },
             scene: b"version = 1",
             constraints: &[],
+            bends: &[],
             triangles: &[],
             collider_count: 0,
             keyframe_size_bytes_max: 8,

@@ -29,7 +29,7 @@ mod _catenary {
     #[pymodule_export]
     use crate::data::outcome::Outcome;
     #[pymodule_export]
-    use crate::data::scene::{Topology, scene_names};
+    use crate::data::scene::{Bends, Topology, scene_names};
     #[pymodule_export]
     use crate::data::snapshot::Snapshot;
     #[pymodule_export]

@@ -19,7 +19,7 @@ use crate::convert::{from_json, motion};
 use crate::data::action::Action;
 use crate::data::forces::{Forces, forces_row};
 use crate::data::outcome::{Outcome, indices};
-use crate::data::scene::{Topology, corners};
+use crate::data::scene::{Bends, Topology, corners};
 use crate::data::snapshot::{ForcesSource, Snapshot};
 use crate::data::state::{State, current_state};
 use crate::error::{
@@ -304,6 +304,11 @@ impl Node {
     fn topology(&self, py: Python<'_>) -> PyResult<Topology> {
         let topology = self.latched(py, Client::topology)?;
         Topology::new(py, &topology.header, &topology.constraints)
+    }
+
+    /// Returns the bends.
+    fn bends(&self, py: Python<'_>) -> PyResult<Bends> {
+        Bends::new(py, &self.latched(py, Client::bends)?.bends)
     }
 
     /// Returns the particles of each triangle of the surface. Shape: (triangles, 3).

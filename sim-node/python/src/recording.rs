@@ -17,7 +17,7 @@ use sim_contract::SnapshotHeader;
 use crate::arguments;
 use crate::convert::from_json;
 use crate::data::forces::Forces;
-use crate::data::scene::{Topology, corners};
+use crate::data::scene::{Bends, Topology, corners};
 use crate::data::snapshot::{ForcesSource, Snapshot};
 use crate::data::state::State;
 use crate::error::{Error, RecordingError, recording_error};
@@ -180,6 +180,12 @@ impl Recording {
         })?;
         let constraints = constraints.ok_or_else(|| self.malformed("/topology"))?;
         Topology::new(py, &header, &constraints)
+    }
+
+    /// Returns the bends. A recording of format 5 or earlier does not list them.
+    fn bends(&self, py: Python<'_>) -> PyResult<Bends> {
+        let bends = self.with(|tape| Ok(tape.topology().bends()))?;
+        Bends::new(py, &bends.ok_or_else(|| self.malformed("/topology"))?)
     }
 
     /// Returns the particles of each triangle of the surface. Shape: (triangles, 3).

@@ -7,7 +7,7 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use recorder::simulation::{colliders_row, forces_row};
-use recorder::{RunDescription, constraint_state};
+use recorder::{RunDescription, bend_state, constraint_state};
 use sim_contract::clock::monotonic_ns;
 use sim_contract::{LoadHeader, ParticleState, SnapshotHeader, Triangle, scene_hash};
 use sim_solver::{Applied, Control, Reason, SOLVER_VERSION, Scene, Solver};
@@ -17,7 +17,7 @@ use crate::convert::{from_json, motion};
 use crate::data::action::Action;
 use crate::data::forces::Forces;
 use crate::data::outcome::{cause, indices, rejected};
-use crate::data::scene::{Topology, corners, load_scene, scene_error};
+use crate::data::scene::{Bends, Topology, corners, load_scene, scene_error};
 use crate::data::snapshot::{ForcesSource, POSITION, Snapshot, VELOCITY};
 use crate::data::state::State;
 use crate::data::view;
@@ -242,6 +242,13 @@ impl Simulation {
             Ok(running.solver.constraints().map(constraint_state).collect::<Vec<_>>())
         })?;
         Topology::new(py, &self.load_header(), &constraints)
+    }
+
+    /// Returns the bends.
+    fn bends(&self, py: Python<'_>) -> PyResult<Bends> {
+        let bends =
+            self.with(py, |running| Ok(running.solver.bends().map(bend_state).collect::<Vec<_>>()))?;
+        Bends::new(py, &bends)
     }
 
     /// Returns the particles of each triangle of the surface. Shape: (triangles, 3).

@@ -265,10 +265,10 @@ impl Publisher {
 
     /// Publishes the constraints and triangles of the load.
     pub(super) fn publish_topology(&self, topology: &Topology<'_>) {
-        let Topology { header, constraints, triangles } = *topology;
+        let Topology { header, constraints, bends, triangles } = *topology;
         let mut state = self.state();
         let (topology, surface) =
-            (TopologyRow::new(header, constraints), SurfaceRow::new(header, triangles));
+            (TopologyRow::new(header, constraints, bends), SurfaceRow::new(header, triangles));
         if self.has_subscribers(Topic::Topology) {
             self.send(&mut state, &Message::Topology(topology.clone()), None);
             self.settle(Topic::Topology);

@@ -1,6 +1,6 @@
 //! A load of a scene: everything that does not change until the next one.
 
-use sim_contract::{ConstraintState, LoadHeader, ParticleState, Triangle};
+use sim_contract::{BendState, ConstraintState, LoadHeader, ParticleState, Triangle};
 use thiserror::Error;
 
 use super::summary::SceneSummary;
@@ -13,6 +13,7 @@ pub(crate) struct Load {
     pub(crate) header: LoadHeader,
     pub(crate) summary: SceneSummary,
     pub(crate) constraints: Vec<ConstraintState>,
+    pub(crate) bends: Vec<BendState>,
     pub(crate) triangles: Vec<Triangle>,
 }
 
@@ -46,6 +47,7 @@ impl Load {
         Topology {
             header: &self.header,
             constraints: &self.constraints,
+            bends: &self.bends,
             triangles: &self.triangles,
         }
     }

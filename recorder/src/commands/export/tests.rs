@@ -63,6 +63,7 @@ fn run_at(rate_hz: u32) -> RunDescription {
         method: 0,
         particle_count: 0,
         constraint_count: 0,
+        bend_count: 0,
         solver_version: 1,
         contract_version: 1,
         recorder_version: "0.1.0".to_owned(),

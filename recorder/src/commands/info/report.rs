@@ -19,6 +19,7 @@ pub(crate) struct Info {
     pub(super) scene: String,
     pub(super) particle_count: u32,
     pub(super) constraint_count: u32,
+    pub(super) bend_count: u32,
     pub(super) rate_hz: u32,
     pub(super) method: &'static str,
     /// 16 hex digits.
@@ -68,6 +69,7 @@ impl Info {
             scene: run.scene_name.clone(),
             particle_count: run.particle_count,
             constraint_count: run.constraint_count,
+            bend_count: run.bend_count,
             rate_hz: run.rate_hz,
             method: run.method_name(),
             run_id: format!("{:016x}", run.run_id),
@@ -116,9 +118,13 @@ impl Info {
     fn write_run(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (file, file_end) = (printable_line(&self.file), printable_line(&self.file_end));
         writeln!(f, "file        {file}, {} bytes, {file_end}", self.size_bytes)?;
+        let bends = match self.bend_count {
+            0 => String::new(),
+            count => format!("{}, ", counted(count, "bend")),
+        };
         writeln!(
             f,
-            "scene       {}: {}, {}, {} Hz, {}",
+            "scene       {}: {}, {}, {bends}{} Hz, {}",
             printable_line(&self.scene),
             counted(self.particle_count, "particle"),
             counted(self.constraint_count, "constraint"),

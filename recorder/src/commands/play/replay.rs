@@ -80,6 +80,8 @@ impl Replay {
         let run_id = getrandom::u64().context("cannot get a random run id")?;
         let constraints =
             topology.constraints().context("the columns of /topology differ in length")?;
+        let bends =
+            topology.bends().context("the columns of the bends in /topology differ in length")?;
         let triangles = surface
             .triangles()
             .context("the number of indices in /surface is not a multiple of three")?;
@@ -88,6 +90,7 @@ impl Replay {
             header,
             scene,
             constraints: &constraints,
+            bends: &bends,
             triangles: &triangles,
             collider_count: recorded.collider_count,
             keyframe_size_bytes_max: recorded.keyframe_size_bytes_max,

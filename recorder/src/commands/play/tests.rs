@@ -32,6 +32,7 @@ fn run() -> RunDescription {
         method: 0,
         particle_count: 2,
         constraint_count: 1,
+        bend_count: 0,
         solver_version: 3,
         contract_version: CONTRACT_VERSION,
         recorder_version: "0".to_owned(),
@@ -77,7 +78,11 @@ fn replay_after(domain: &TestDomain, owner: Option<Owner>, position: Position) -
     let recorded = Recorded {
         run: &run(),
         scene: b"version = 1",
-        topology: &TopologyRow::new(&load, &[ConstraintState { b: 1, ..Default::default() }; 4]),
+        topology: &TopologyRow::new(
+            &load,
+            &[ConstraintState { b: 1, ..Default::default() }; 4],
+            &[],
+        ),
         surface: &SurfaceRow::new(&load, &[Triangle { corners: [0, 1, 0] }]),
         collider_count: 1,
         keyframe_size_bytes_max: 64,
@@ -203,6 +208,7 @@ fn a_name_in_use_is_refused() {
         header: LoadHeader::default(),
         scene: b"",
         constraints: &[],
+        bends: &[],
         triangles: &[],
         collider_count: 0,
         keyframe_size_bytes_max: 1,

@@ -59,7 +59,7 @@ impl Load {
             header: loaded.header,
             scene: Scene::from_toml(text, "scene.toml")?,
             text: loaded.scene.clone(),
-            topology: TopologyRow::new(&loaded.header, &loaded.constraints),
+            topology: TopologyRow::new(&loaded.header, &loaded.constraints, &loaded.bends),
             surface: SurfaceRow::new(&loaded.header, &loaded.triangles),
             epoch_ns: 0,
         })
@@ -93,6 +93,7 @@ impl Load {
             method: self.header.method,
             particle_count: first.particle_count,
             constraint_count: u32::try_from(self.topology.a.len()).unwrap_or(u32::MAX),
+            bend_count: u32::try_from(self.topology.bends.shape.len()).unwrap_or(u32::MAX),
             solver_version: first.solver_version,
             contract_version: first.contract_version,
             recorder_version: env!("CARGO_PKG_VERSION").to_owned(),

@@ -76,6 +76,7 @@ fn description() -> RunDescription {
         method: 0,
         particle_count: 1000,
         constraint_count: 0,
+        bend_count: 0,
         solver_version: 1,
         contract_version: 1,
         recorder_version: "0".to_owned(),

@@ -16,6 +16,8 @@ pub(super) struct RecordingCopy<'a> {
     reader: LinearReader,
     file: Writer<NoSeek<&'a mut dyn Write>>,
     particles_channel: Option<u16>,
+    /// The row in /steps whose snapshot has not come yet.
+    row: Option<(MessageHeader, Vec<u8>)>,
     /// The topics of a recording, by channel.
     topics: BTreeMap<u16, Topic>,
     /// Messages of these topics that are copied.
@@ -48,6 +50,7 @@ impl<'a> RecordingCopy<'a> {
             reader,
             file,
             particles_channel: None,
+            row: None,
             topics: BTreeMap::new(),
             counts: AllCounts::default(),
             has_closing: false,
@@ -68,7 +71,8 @@ impl<'a> RecordingCopy<'a> {
     }
 
     /// Copies the rest and writes the index. If the source has no end, the copy declares that, with the
-    /// messages that `count_gaps` finds missing.
+    /// messages that `count_gaps` finds missing. If it ends before the snapshot of a row in /steps, the row is left
+    /// out.
     pub(super) fn finish(
         mut self,
         count_gaps: impl FnOnce() -> anyhow::Result<AllCounts>,
@@ -131,10 +135,12 @@ impl<'a> RecordingCopy<'a> {
                 )?;
             }
             Record::Message { header, data } => {
-                self.file.write_to_known_channel(&header, &data)?;
-                if let Some(topic) = self.topics.get(&header.channel_id) {
-                    self.counts[*topic].written += 1;
+                self.write_row()?;
+                if self.topics.get(&header.channel_id) == Some(&Topic::Steps) {
+                    self.row = Some((header, data.into_owned()));
+                    return Ok(None);
                 }
+                self.write_message(&header, &data)?;
                 if self.particles_channel == Some(header.channel_id) {
                     self.snapshot = Some(header);
                     return Ok(Some(header.sequence));
@@ -149,11 +155,31 @@ impl<'a> RecordingCopy<'a> {
             })?,
             Record::Metadata(metadata) => {
                 self.has_closing |= metadata.name == CLOSING_METADATA;
+                if self.has_closing {
+                    self.write_row()?;
+                }
                 self.file.write_metadata(&metadata)?;
             }
             _ => {}
         }
         Ok(None)
+    }
+}
+
+impl RecordingCopy<'_> {
+    fn write_row(&mut self) -> anyhow::Result<()> {
+        match self.row.take() {
+            Some((header, data)) => self.write_message(&header, &data),
+            None => Ok(()),
+        }
+    }
+
+    fn write_message(&mut self, header: &MessageHeader, data: &[u8]) -> anyhow::Result<()> {
+        self.file.write_to_known_channel(header, data)?;
+        if let Some(topic) = self.topics.get(&header.channel_id) {
+            self.counts[*topic].written += 1;
+        }
+        Ok(())
     }
 }
 

@@ -448,7 +448,7 @@ impl Check {
                 self.findings.add_index(end, "metadata 'recorder'", what);
             }
             // Recorders of older formats do not count /tf, which belongs to the header.
-            let is_counted = topic != Topic::Tf || content.is_current_format;
+            let is_counted = topic != Topic::Tf || content.counts_transforms;
             if is_counted && claimed.written != counted.written {
                 let what = format!(
                     "it counts {} messages on {name}, but the file has {}",

@@ -11,7 +11,7 @@ use crate::log::backlog::Backlog;
 use crate::log::encoding::channel::TopicChannel;
 use crate::log::encoding::particle_bytes;
 use crate::log::message::Message;
-use crate::log::read::audit::is_current_format;
+use crate::log::read::audit::{format_version, is_current_format};
 use crate::log::read::decode::MessageDecoder;
 use crate::log::read::gaps::GapCounter;
 use crate::log::read::limits::SizeLimits;
@@ -49,6 +49,8 @@ pub(super) struct ContentCheck {
     run: RunDescription,
     /// The file has the format that this recorder writes.
     pub(super) is_current_format: bool,
+    /// The recorder that wrote it counts /tf.
+    pub(super) counts_transforms: bool,
     selection: ContentSelection,
     limits: SizeLimits,
     channels: BTreeMap<u16, Option<TopicChannel>>,
@@ -67,6 +69,9 @@ pub(super) struct ContentCheck {
     pub(super) unhashed_count: u64,
 }
 
+/// First version of the format that counts /tf.
+const COUNTED_TRANSFORMS_VERSION: u32 = 5;
+
 impl ContentCheck {
     /// Starts with the metadata `run` of a file.
     pub(super) fn new(
@@ -75,9 +80,11 @@ impl ContentCheck {
         scene_size_bytes: usize,
     ) -> Result<Self, ReadError> {
         let is_current_format = is_current_format(run);
+        let counts_transforms = format_version(run) >= COUNTED_TRANSFORMS_VERSION;
         let run = read_run(run)?;
         Ok(Self {
             is_current_format,
+            counts_transforms,
             selection,
             limits: SizeLimits::new(&run, scene_size_bytes),
             backlog: Backlog::new(&run, scene_size_bytes),

@@ -265,6 +265,11 @@ pub(in crate::log) fn is_current_format(map: &BTreeMap<String, String>) -> bool 
     map.get("format_version").is_some_and(|version| *version == FORMAT_VERSION.to_string())
 }
 
+/// Returns the version of the format of this file; 0 without one.
+pub(in crate::log) fn format_version(map: &BTreeMap<String, String>) -> u32 {
+    map.get("format_version").and_then(|version| version.parse().ok()).unwrap_or_default()
+}
+
 /// Returns the first key whose value differs.
 fn first_other_key<'a>(
     found: &'a BTreeMap<String, String>,

@@ -150,7 +150,7 @@ mod tests {
         invalid type: integer `7`, expected an object at line 1 column 1
         invalid type: string "x", expected a whole number at line 1 column 11
         EOF while parsing an object at line 1 column 1
-        invalid length 0, expected an object with 9 elements at line 1 column 2
+        invalid length 0, expected an object with 10 elements at line 1 column 2
         expected one column: compliance or stiffness
         expected a number, three numbers or null at line 1 column 111
         "#);

@@ -36,6 +36,7 @@ pub(in crate::log) fn compression_growth(size_bytes: u64) -> u64 {
 pub(in crate::log) struct SizeLimits {
     particle_count: u64,
     constraint_count: u64,
+    bend_count: u64,
     scene_size_bytes: u64,
 }
 
@@ -46,17 +47,18 @@ impl SizeLimits {
         Self {
             particle_count: u64::from(run.particle_count),
             constraint_count: u64::from(run.constraint_count),
+            bend_count: u64::from(run.bend_count),
             scene_size_bytes: scene_size_bytes as u64,
         }
     }
 
     /// Returns the length of the longest message on a topic.
     pub(in crate::log) fn message_size_bytes_max(&self, topic: Topic) -> u64 {
-        let Self { particle_count, constraint_count, scene_size_bytes } = *self;
+        let Self { particle_count, constraint_count, bend_count, scene_size_bytes } = *self;
         let growing = match topic {
             // Per constraint: two particles, a kind and a tear of up to 9 digits, and two numbers of up
-            // to 25.
-            Topic::Topology => 96 * constraint_count,
+            // to 25. Per bend: four particles, a shape and a block, and seven numbers.
+            Topic::Topology => 96 * constraint_count + 256 * bend_count,
             // Three indices per triangle. Generated cloth has two triangles per particle, and a listed
             // triangle has at least 6 bytes in the scene.
             Topic::Surface => 54 * particle_count + 5 * scene_size_bytes,
@@ -119,7 +121,7 @@ impl SizeLimits {
 #[cfg(test)]
 mod tests {
     use sim_contract::{
-        COLLIDERS_MAX, ConstraintState, ELEMENTS_MAX, LoadHeader, PlainF32, TearCause,
+        BendState, COLLIDERS_MAX, ConstraintState, ELEMENTS_MAX, LoadHeader, PlainF32, TearCause,
         TornConstraint,
     };
     use sim_solver::{Scene, Solver, builtin};
@@ -128,7 +130,7 @@ mod tests {
     use crate::log::rows::{SurfaceRow, TearsRow, TopologyRow};
 
     fn limits(particle_count: u64, constraint_count: u64, scene_size_bytes: u64) -> SizeLimits {
-        SizeLimits { particle_count, constraint_count, scene_size_bytes }
+        SizeLimits { particle_count, constraint_count, bend_count: 0, scene_size_bytes }
     }
 
     /// The number with the longest text that a column can have.
@@ -150,12 +152,23 @@ mod tests {
             kind: 3,
         };
         let count = 5000;
-        let mut topology = TopologyRow::new(&LoadHeader::default(), &vec![constraint; count]);
+        let bend = BendState {
+            particles: [index; 4],
+            coefficients: [number; 4],
+            geometry: number,
+            rigidity: number,
+            rest: number,
+            shape: 2,
+            block: index as i32,
+        };
+        let mut topology =
+            TopologyRow::new(&LoadHeader::default(), &vec![constraint; count], &vec![bend; count]);
         topology.torn = vec![index; count];
         let torn = vec![TornConstraint::new(index, Some(TearCause::Distance)); count];
         let tears = TearsRow::new(u64::MAX, &torn);
         let surface = SurfaceRow { step: 0, triangles: vec![index; 3 * 2 * count] };
-        let limits = limits(count as u64, count as u64, 0);
+        let limits =
+            SizeLimits { bend_count: count as u64, ..limits(count as u64, count as u64, 0) };
         for (topic, text) in [
             (Topic::Topology, serde_json::to_string(&topology).unwrap()),
             (Topic::Tears, serde_json::to_string(&tears).unwrap()),

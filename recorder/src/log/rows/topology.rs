@@ -2,9 +2,13 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use sim_contract::{ConstraintState, LoadHeader, PlainF32, Torn, TornConstraint, Triangle};
+use sim_contract::{
+    BendState, ConstraintState, LoadHeader, PlainF32, Torn, TornConstraint, Triangle,
+};
+use sim_solver::Bend;
 
-/// The constraints of a scene in columns. The position in a column is the constraint's index.
+/// The constraints of a scene in columns, and then its bends. The position in a column is the constraint's
+/// index.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "Columns")]
 #[schemars(!try_from)]
@@ -29,6 +33,31 @@ pub struct TopologyRow {
     /// Indices of the constraints that were torn before the first snapshot of the file, in the order
     /// of tearing.
     pub torn: Vec<u32>,
+    /// The bends. Empty in recordings of format 5 and earlier.
+    pub bends: BendColumns,
+}
+
+/// The bends of a scene in columns: [`BendState`]s. They have their own indices, and never tear.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct BendColumns {
+    /// Four particle indices per bend. The fourth of a bend of three is its second one again.
+    pub particles: Vec<u32>,
+    /// Four coefficients per bend; the fourth of a bend of three is 0.
+    #[schemars(with = "Vec<f32>")]
+    pub coefficients: Vec<PlainF32>,
+    /// Compliances times rigidities: m^2 on a surface, m^3 on a line.
+    #[schemars(with = "Vec<f32>")]
+    pub geometry: Vec<PlainF32>,
+    /// Bending rigidities of the scene: N m on a surface, N m^2 on a line.
+    #[schemars(with = "Vec<f32>")]
+    pub rigidity: Vec<PlainF32>,
+    /// Values at rest in m. Other than 0 only for hinges that are folded at rest.
+    #[schemars(with = "Vec<f32>")]
+    pub rest: Vec<PlainF32>,
+    /// 0 three particles on a line, 1 the corners of a cell, 2 a hinge of two triangles.
+    pub shape: Vec<u32>,
+    /// Indices of the `[[generate]]` blocks that they come from; -1 for explicit bends.
+    pub block: Vec<i32>,
 }
 
 /// The column of [`TopologyRow`] whose name depends on the method.
@@ -53,20 +82,22 @@ struct Columns {
     stiffness: Option<Vec<PlainF32>>,
     kind: Vec<u32>,
     torn: Vec<u32>,
+    #[serde(default)]
+    bends: BendColumns,
 }
 
 impl TryFrom<Columns> for TopologyRow {
     type Error = &'static str;
 
     fn try_from(columns: Columns) -> Result<Self, Self::Error> {
-        let Columns { step, revision, a, b, rest_length, compliance, stiffness, kind, torn } =
+        let Columns { step, revision, a, b, rest_length, compliance, stiffness, kind, torn, bends } =
             columns;
         let softness = match (compliance, stiffness) {
             (Some(compliance), None) => Softness::Compliance(compliance),
             (None, Some(stiffness)) => Softness::Stiffness(stiffness),
             _ => return Err("expected one column: compliance or stiffness"),
         };
-        Ok(Self { step, revision, a, b, rest_length, softness, kind, torn })
+        Ok(Self { step, revision, a, b, rest_length, softness, kind, torn, bends })
     }
 }
 
@@ -85,9 +116,23 @@ pub fn constraint_state(constraint: sim_solver::Constraint) -> ConstraintState {
     ConstraintState { a, b, rest_length, compliance, kind: kind as u32 }
 }
 
+/// Returns a bend as it is published.
+pub fn bend_state(bend: Bend) -> BendState {
+    let Bend { particles, coefficients, geometry, rigidity, shape, block } = bend;
+    BendState {
+        particles,
+        coefficients,
+        geometry,
+        rigidity,
+        rest: shape.rest(),
+        shape: shape.number(),
+        block: block.and_then(|block| i32::try_from(block).ok()).unwrap_or(-1),
+    }
+}
+
 impl TopologyRow {
     /// Returns the row of a load, with no torn constraints.
-    pub fn new(header: &LoadHeader, constraints: &[ConstraintState]) -> Self {
+    pub fn new(header: &LoadHeader, constraints: &[ConstraintState], bends: &[BendState]) -> Self {
         let softness = constraints.iter().map(|c| PlainF32(c.compliance)).collect();
         Self {
             step: header.step,
@@ -101,6 +146,7 @@ impl TopologyRow {
             },
             kind: constraints.iter().map(|c| c.kind).collect(),
             torn: Vec::new(),
+            bends: BendColumns::new(bends),
         }
     }
 
@@ -111,11 +157,17 @@ impl TopologyRow {
         columns.iter().sum::<usize>()
             + size_of_val(&self.rest_length[..])
             + size_of_val(&softness[..])
+            + self.bends.size_bytes()
     }
 
     /// Returns the constraints that were torn before the recording, with unknown causes.
     pub fn torn_before(&self) -> Torn {
         self.torn.iter().map(|index| TornConstraint::new(*index, None)).collect()
+    }
+
+    /// Returns the bends, or `None` if their columns differ in length.
+    pub fn bends(&self) -> Option<Vec<BendState>> {
+        self.bends.rows()
     }
 
     /// Returns the constraints, or `None` if the columns differ in length.
@@ -134,6 +186,60 @@ impl TopologyRow {
             kind: self.kind[index],
         };
         Some((0..count).map(constraint).collect())
+    }
+}
+
+impl BendColumns {
+    fn new(bends: &[BendState]) -> Self {
+        let column = |value: fn(&BendState) -> f32| bends.iter().map(value).map(PlainF32).collect();
+        Self {
+            particles: bends.iter().flat_map(|one| one.particles).collect(),
+            coefficients: bends.iter().flat_map(|one| one.coefficients).map(PlainF32).collect(),
+            geometry: column(|one| one.geometry),
+            rigidity: column(|one| one.rigidity),
+            rest: column(|one| one.rest),
+            shape: bends.iter().map(|one| one.shape).collect(),
+            block: bends.iter().map(|one| one.block).collect(),
+        }
+    }
+
+    fn size_bytes(&self) -> usize {
+        let numbers = [&self.coefficients, &self.geometry, &self.rigidity, &self.rest];
+        numbers.iter().map(|one| size_of_val(&one[..])).sum::<usize>()
+            + size_of_val(&self.particles[..])
+            + size_of_val(&self.shape[..])
+            + size_of_val(&self.block[..])
+    }
+
+    fn rows(&self) -> Option<Vec<BendState>> {
+        let Self { particles, coefficients, geometry, rigidity, rest, shape, block } = self;
+        let (particles, odd_particles) = particles.as_chunks::<4>();
+        let (coefficients, odd_coefficients) = coefficients.as_chunks::<4>();
+        let count = shape.len();
+        let lengths = [
+            particles.len(),
+            coefficients.len(),
+            geometry.len(),
+            rigidity.len(),
+            rest.len(),
+            block.len(),
+        ];
+        if !odd_particles.is_empty()
+            || !odd_coefficients.is_empty()
+            || lengths.iter().any(|length| *length != count)
+        {
+            return None;
+        }
+        let bend = |index: usize| BendState {
+            particles: particles[index],
+            coefficients: coefficients[index].map(|one| one.0),
+            geometry: geometry[index].0,
+            rigidity: rigidity[index].0,
+            rest: rest[index].0,
+            shape: shape[index],
+            block: block[index],
+        };
+        Some((0..count).map(bend).collect())
     }
 }
 

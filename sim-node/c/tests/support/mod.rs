@@ -8,18 +8,29 @@ use std::ptr::null;
 use catenary::*;
 use sim_contract::testing::TestDomain;
 use sim_contract::{
-    ConstraintState, Load, LoadHeader, Owner, ParameterValues, ParticleState, SnapshotHeader,
-    Triangle, Wake,
+    BendState, ConstraintState, Load, LoadHeader, Owner, ParameterValues, ParticleState,
+    SnapshotHeader, Triangle, Wake,
 };
 
 pub(crate) const RUN_ID: u64 = 77;
 pub(crate) const TIMEOUT_S: f64 = 10.0;
+
+pub(crate) const BEND: BendState = BendState {
+    particles: [0, 1, 0, 1],
+    coefficients: [1.0, -2.0, 1.0, 0.0],
+    geometry: 0.5,
+    rigidity: 0.25,
+    rest: 0.0,
+    shape: 0,
+    block: -1,
+};
 
 pub(crate) fn owner(domain: &TestDomain) -> Owner {
     let load = Load {
         header: LoadHeader { run_id: RUN_ID, particle_count: 2, ..LoadHeader::default() },
         scene: b"version = 1",
         constraints: &[ConstraintState { b: 1, rest_length: 0.5, ..ConstraintState::default() }],
+        bends: &[BEND],
         triangles: &[Triangle { corners: [0, 1, 1] }],
         collider_count: 1,
         keyframe_size_bytes_max: 3,

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use crate::messages::snapshot::SnapshotHeader;
-use crate::messages::topology::{ConstraintState, LoadHeader, Triangle};
+use crate::messages::topology::{BendState, ConstraintState, LoadHeader, Triangle};
 
 /// A scene with everything that stays the same until the next load.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -14,6 +14,8 @@ pub struct LoadedScene {
     pub scene: Vec<u8>,
     /// The constraints, by index.
     pub constraints: Vec<ConstraintState>,
+    /// The bends, by index; may be empty.
+    pub bends: Vec<BendState>,
     /// The surface; may be empty.
     pub triangles: Vec<Triangle>,
 }
@@ -50,17 +52,27 @@ pub(crate) struct PartialLoad {
     key: LoadKey,
     pub(crate) scene: Option<Vec<u8>>,
     pub(crate) topology: Option<(LoadHeader, Vec<ConstraintState>)>,
+    pub(crate) bends: Option<Vec<BendState>>,
     pub(crate) triangles: Option<Vec<Triangle>>,
 }
 
 impl PartialLoad {
     fn is_complete(&self) -> bool {
-        self.scene.is_some() && self.topology.is_some() && self.triangles.is_some()
+        self.scene.is_some()
+            && self.topology.is_some()
+            && self.bends.is_some()
+            && self.triangles.is_some()
     }
 
     fn complete(self) -> Option<LoadedScene> {
         let (header, constraints) = self.topology?;
-        Some(LoadedScene { header, scene: self.scene?, constraints, triangles: self.triangles? })
+        Some(LoadedScene {
+            header,
+            scene: self.scene?,
+            constraints,
+            bends: self.bends?,
+            triangles: self.triangles?,
+        })
     }
 }
 

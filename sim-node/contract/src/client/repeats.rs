@@ -15,6 +15,7 @@ use crate::messages::update::Update;
 pub(crate) struct Repeats {
     scene: Option<LoadHeader>,
     topology: Option<LoadHeader>,
+    bends: Option<LoadHeader>,
     surface: Option<LoadHeader>,
     colliders: Option<CollidersHeader>,
     tears: Option<TearsHeader>,
@@ -30,6 +31,7 @@ impl Repeats {
         match *update {
             Update::Scene(header, _) => is_same(&mut self.scene, *header),
             Update::Topology(header, _) => is_same(&mut self.topology, *header),
+            Update::Bends(header, _) => is_same(&mut self.bends, *header),
             Update::Surface(header, _) => is_same(&mut self.surface, *header),
             Update::Colliders(header, _) => is_same(&mut self.colliders, *header),
             Update::Tears(header, _) => is_same(&mut self.tears, *header),

@@ -55,6 +55,9 @@ impl StateAssembler {
             Update::Topology(header, constraints) => {
                 loads.get_or_insert(header).topology = Some((*header, constraints.to_vec()));
             }
+            Update::Bends(header, bends) => {
+                loads.get_or_insert(header).bends = Some(bends.to_vec());
+            }
             Update::Surface(header, triangles) => {
                 loads.get_or_insert(header).triangles = Some(triangles.to_vec());
             }
@@ -214,6 +217,7 @@ mod tests {
         let header = LoadHeader { run_id: RUN_ID, topology_revision, ..LoadHeader::default() };
         assembler.add(&Update::Scene(&header, b"version = 1"));
         assembler.add(&Update::Topology(&header, &[]));
+        assembler.add(&Update::Bends(&header, &[]));
         assembler.add(&Update::Surface(&header, &[]));
     }
 
@@ -351,6 +355,7 @@ mod tests {
         let header = LoadHeader { run_id: 8, ..LoadHeader::default() };
         assembler.add(&Update::Scene(&header, b""));
         assembler.add(&Update::Topology(&header, &[]));
+        assembler.add(&Update::Bends(&header, &[]));
         assembler.add(&Update::Surface(&header, &[]));
         let other = SnapshotHeader { run_id: 8, ..snapshot(1, 0) };
         let state = assembler.assemble(&other, &[]).unwrap();

@@ -22,11 +22,11 @@ use crate::messages::parameters::{ParameterState, ParametersHeader};
 use crate::messages::snapshot::{ParticleState, SnapshotHeader};
 use crate::messages::status::NodeStatus;
 use crate::messages::tears::{TearsHeader, TornConstraint};
-use crate::messages::topology::{ConstraintState, KeyframeHeader, LoadHeader, Triangle};
+use crate::messages::topology::{BendState, ConstraintState, KeyframeHeader, LoadHeader, Triangle};
 use crate::messages::update::Update;
 use crate::ports::reader::{Drained, ReadError, SliceReader, SliceSample, ValueReader};
 use crate::ports::service::{
-    COLLIDERS, FORCES, KEYFRAME, OUTCOMES, PARAMETERS, PARTICLES, SCENE, STATUS, SURFACE,
+    BENDS, COLLIDERS, FORCES, KEYFRAME, OUTCOMES, PARAMETERS, PARTICLES, SCENE, STATUS, SURFACE,
     ServiceError, TEARS, TOPOLOGY,
 };
 use crate::ports::services::{AttachError, Attachment};
@@ -84,6 +84,7 @@ pub struct Tap {
     parameters: SliceReader<ParameterState, ParametersHeader>,
     scene: SliceReader<u8, LoadHeader>,
     topology: SliceReader<ConstraintState, LoadHeader>,
+    bends: SliceReader<BendState, LoadHeader>,
     surface: SliceReader<Triangle, LoadHeader>,
     /// Only of a tap that reads them.
     forces: Option<SliceReader<ForceRow, ForcesHeader>>,
@@ -153,6 +154,7 @@ impl Tap {
                 .restricted_to(source),
             scene: SliceReader::create(&services.scene, &SCENE)?.restricted_to(source),
             topology: SliceReader::create(&services.topology, &TOPOLOGY)?.restricted_to(source),
+            bends: SliceReader::create(&services.bends, &BENDS)?.restricted_to(source),
             surface: SliceReader::create(&services.surface, &SURFACE)?.restricted_to(source),
             forces: None,
             keyframe: SliceReader::create(&services.keyframe, &KEYFRAME)?.restricted_to(source),
@@ -340,6 +342,7 @@ impl Tap {
         let result = &mut drained;
         self.scene.drain(result, |header, bytes| sink(Update::Scene(header, bytes)));
         self.topology.drain(result, |header, items| sink(Update::Topology(header, items)));
+        self.bends.drain(result, |header, items| sink(Update::Bends(header, items)));
         self.surface.drain(result, |header, items| sink(Update::Surface(header, items)));
         self.colliders.drain(result, |header, items| sink(Update::Colliders(header, items)));
         self.tears.drain(result, |header, items| sink(Update::Tears(header, items)));

@@ -4,7 +4,7 @@ use crate::messages::collider::{ColliderState, CollidersHeader};
 use crate::messages::forces::{ForceKind, ForceRow, ForcesHeader};
 use crate::messages::parameters::ParametersHeader;
 use crate::messages::snapshot::{ParticleState, SnapshotHeader};
-use crate::messages::topology::{ConstraintState, LoadHeader, Triangle};
+use crate::messages::topology::{BendState, ConstraintState, LoadHeader, Triangle};
 use crate::ports::reader::SliceSample;
 use sim_types::ParameterValues;
 
@@ -31,6 +31,15 @@ pub struct Topology {
     pub header: LoadHeader,
     /// The `header.count` constraints, by index.
     pub constraints: Vec<ConstraintState>,
+}
+
+/// The bends of a load.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Bends {
+    /// Header of the load.
+    pub header: LoadHeader,
+    /// The `header.count` bends, by index; empty if the scene has none.
+    pub bends: Vec<BendState>,
 }
 
 /// The triangles of a load.

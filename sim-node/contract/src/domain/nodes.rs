@@ -155,6 +155,7 @@ mod tests {
         },
         scene: b"",
         constraints: &[],
+        bends: &[],
         triangles: &[],
         collider_count: 0,
         keyframe_size_bytes_max: 0,

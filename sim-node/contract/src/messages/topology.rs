@@ -1,4 +1,4 @@
-//! The messages of the services `topology`, `surface`, `scene` and `keyframe`.
+//! The messages of the services `topology`, `bends`, `surface`, `scene` and `keyframe`.
 
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
@@ -23,6 +23,35 @@ pub struct ConstraintState {
 
 const _: () = assert!(size_of::<ConstraintState>() == 20 && align_of::<ConstraintState>() == 4);
 
+/// A bend: 52 bytes, alignment 4; an element of `bends`. Its position there is its index. It does not
+/// change until the next load, and never tears; it stops acting once a constraint of its path is torn.
+///
+/// With C the sum of c x over its particles, its energy in J is |C - rest n|^2 / (2 alpha), where
+/// alpha = `geometry` / rigidity is its compliance in m/N, and n the unit vector along the sum of the unit
+/// normals of the two triangles of a hinge. `set bending` replaces the rigidity.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable, ZeroCopySend)]
+#[repr(C)]
+#[type_name("catenary.BendState")]
+pub struct BendState {
+    /// Indices of the particles. The fourth of a bend of three is its second one again.
+    pub particles: [u32; 4],
+    /// Coefficients c of the particles; their sum is 0. The fourth of a bend of three is 0.
+    pub coefficients: [f32; 4],
+    /// Compliance times rigidity: m^2 on a surface, m^3 on a line.
+    pub geometry: f32,
+    /// Bending rigidity of the scene: N m on a surface, N m^2 on a line.
+    pub rigidity: f32,
+    /// C along n at rest, in m. Other than 0 only for a hinge that is folded at rest.
+    pub rest: f32,
+    /// 0 three particles on a line, 1 the corners of a cell, which it keeps from twisting, 2 a hinge: a third
+    /// corner, the ends of the edge, and the other third corner of two triangles.
+    pub shape: u32,
+    /// Index of the `[[generate]]` block that it comes from; -1 for an explicit bend.
+    pub block: i32,
+}
+
+const _: () = assert!(size_of::<BendState>() == 52 && align_of::<BendState>() == 4);
+
 /// A triangle of the surface: 12 bytes, alignment 4; an element of `surface`.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable, ZeroCopySend)]
 #[repr(C)]
@@ -34,7 +63,7 @@ pub struct Triangle {
 
 const _: () = assert!(size_of::<Triangle>() == 12 && align_of::<Triangle>() == 4);
 
-/// Header of `topology`, `surface` and `scene`: 72 bytes, alignment 8. Written once per load.
+/// Header of `topology`, `bends`, `surface` and `scene`: 72 bytes, alignment 8. Written once per load.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable, ZeroCopySend)]
 #[repr(C)]
 #[type_name("catenary.LoadHeader")]
@@ -49,7 +78,7 @@ pub struct LoadHeader {
     pub origin: [f64; 3],
     /// Same as in [`crate::SnapshotHeader`].
     pub topology_revision: u32,
-    /// Length of the payload in constraints, triangles or bytes.
+    /// Length of the payload in constraints, bends, triangles or bytes.
     pub count: u32,
     /// Number of particles in the scene.
     pub particle_count: u32,

@@ -8,7 +8,7 @@ use crate::messages::outcome::Outcome;
 use crate::messages::parameters::ParametersHeader;
 use crate::messages::status::NodeStatus;
 use crate::messages::tears::{TearsHeader, TornConstraint};
-use crate::messages::topology::{ConstraintState, KeyframeHeader, LoadHeader, Triangle};
+use crate::messages::topology::{BendState, ConstraintState, KeyframeHeader, LoadHeader, Triangle};
 
 /// A message of any service except `particles`, in shared memory.
 #[derive(Debug, Clone, Copy)]
@@ -17,6 +17,8 @@ pub enum Update<'a> {
     Scene(&'a LoadHeader, &'a [u8]),
     /// The constraints of a load.
     Topology(&'a LoadHeader, &'a [ConstraintState]),
+    /// The bends of a load; may be empty.
+    Bends(&'a LoadHeader, &'a [BendState]),
     /// The triangles of a load; may be empty.
     Surface(&'a LoadHeader, &'a [Triangle]),
     /// All colliders, in their poses at the end of a step.

@@ -9,7 +9,7 @@ use crate::messages::parameters::{ParameterState, ParametersHeader};
 use crate::messages::restore::scene_hash;
 use crate::messages::snapshot::{ParticleState, SnapshotHeader};
 use crate::messages::tears::{TearsHeader, TornConstraint};
-use crate::messages::topology::{ConstraintState, KeyframeHeader, LoadHeader, Triangle};
+use crate::messages::topology::{BendState, ConstraintState, KeyframeHeader, LoadHeader, Triangle};
 use crate::owner::error::OwnerError;
 use crate::ports::memory;
 use crate::ports::service::{
@@ -31,6 +31,8 @@ pub struct Load<'a> {
     pub scene: &'a [u8],
     /// All constraints, by index.
     pub constraints: &'a [ConstraintState],
+    /// All bends, by index; may be empty.
+    pub bends: &'a [BendState],
     /// The surface; may be empty.
     pub triangles: &'a [Triangle],
     /// Number of colliders, at most [`COLLIDERS_MAX`].
@@ -53,10 +55,11 @@ impl Load<'_> {
 pub(crate) struct LoadWriters {
     pub(crate) particles: SliceWriter<ParticleState, SnapshotHeader>,
     pub(crate) keyframe: SliceWriter<u8, KeyframeHeader>,
-    // These three publish only the load, so they have memory for one message of exactly its length. New
+    // These four publish only the load, so they have memory for one message of exactly its length. New
     // writers replace them when they publish it again.
     pub(super) scene: RefCell<SliceWriter<u8, LoadHeader>>,
     pub(super) topology: RefCell<SliceWriter<ConstraintState, LoadHeader>>,
+    pub(super) bends: RefCell<SliceWriter<BendState, LoadHeader>>,
     pub(super) surface: RefCell<SliceWriter<Triangle, LoadHeader>>,
     pub(super) tears: SliceWriter<TornConstraint, TearsHeader>,
     pub(super) parameters: SliceWriter<ParameterState, ParametersHeader>,
@@ -72,6 +75,7 @@ pub(super) struct Capacities {
     keyframe: Capacity,
     scene: Capacity,
     topology: Capacity,
+    bends: Capacity,
     surface: Capacity,
     tears: Capacity,
     parameters: Capacity,
@@ -88,6 +92,7 @@ impl Capacities {
             keyframe: many(&KEYFRAME, load.keyframe_size_bytes_max),
             scene: single(load.scene.len()),
             topology: single(load.constraints.len()),
+            bends: single(load.bends.len()),
             surface: single(load.triangles.len()),
             tears: many(&TEARS, load.constraints.len()),
             parameters: many(&PARAMETERS, SETTINGS_COUNT),
@@ -100,6 +105,7 @@ impl Capacities {
             + self.keyframe.size_bytes::<u8, KeyframeHeader>()
             + self.scene.size_bytes::<u8, LoadHeader>()
             + self.topology.size_bytes::<ConstraintState, LoadHeader>()
+            + self.bends.size_bytes::<BendState, LoadHeader>()
             + self.surface.size_bytes::<Triangle, LoadHeader>()
             + self.tears.size_bytes::<TornConstraint, TearsHeader>()
             + self.parameters.size_bytes::<ParameterState, ParametersHeader>()
@@ -120,6 +126,7 @@ impl LoadWriters {
                 &services.topology,
                 capacities.topology,
             )?),
+            bends: RefCell::new(SliceWriter::create(config, &services.bends, capacities.bends)?),
             surface: RefCell::new(SliceWriter::create(
                 config,
                 &services.surface,
@@ -139,6 +146,7 @@ impl LoadWriters {
             self.keyframe.close(),
             self.scene.into_inner().close(),
             self.topology.into_inner().close(),
+            self.bends.into_inner().close(),
             self.surface.into_inner().close(),
             self.tears.close(),
             self.parameters.close(),
@@ -162,6 +170,7 @@ impl LoadWriters {
         self.topology
             .borrow()
             .write(header(payload_count(constraints)), |index| constraints[index])?;
+        self.bends.borrow().write(header(payload_count(load.bends)), |index| load.bends[index])?;
         self.surface
             .borrow()
             .write(header(payload_count(load.triangles)), |index| load.triangles[index])?;
@@ -207,6 +216,7 @@ impl LoadWriters {
     pub(crate) fn refresh(&self) {
         self.scene.borrow().refresh();
         self.topology.borrow().refresh();
+        self.bends.borrow().refresh();
         self.surface.borrow().refresh();
         self.colliders.refresh();
         self.tears.refresh();

@@ -118,6 +118,7 @@ mod tests {
             header: LoadHeader { particle_count, ..LoadHeader::default() },
             scene: b"version = 1",
             constraints: &[],
+            bends: &[],
             triangles: &[],
             collider_count: 0,
             keyframe_size_bytes_max: 8,
@@ -145,7 +146,7 @@ mod tests {
         let new: BTreeSet<_> = both.difference(&old).cloned().collect();
         owner.load(&load(20)).unwrap();
         let kept = files(&domain);
-        assert_eq!(new.len(), 8);
+        assert_eq!(new.len(), 9);
         assert!(new.is_subset(&kept) && kept.is_subset(&both), "{new:?} {kept:?}");
         assert_eq!(kept.len(), old.len());
     }
@@ -157,7 +158,7 @@ mod tests {
         let count = files(&domain).len();
         prepare(&owner, 20);
         prepare(&owner, 30);
-        assert_eq!(files(&domain).len(), count + 8);
+        assert_eq!(files(&domain).len(), count + 9);
         owner.load(&load(20)).unwrap();
         assert_eq!(files(&domain).len(), count);
         prepare(&owner, 40);

@@ -13,7 +13,7 @@ use crate::owner::load::LoadWriters;
 use crate::ports::port::SliceHeader;
 use crate::ports::reader::{ReadError, SliceReader, SliceSample};
 use crate::ports::service::{
-    COLLIDERS, FORCES, KEYFRAME, PARAMETERS, PARTICLES, SCENE, SURFACE, ServiceSpec, TEARS,
+    BENDS, COLLIDERS, FORCES, KEYFRAME, PARAMETERS, PARTICLES, SCENE, SURFACE, ServiceSpec, TEARS,
     TOPOLOGY,
 };
 use crate::ports::services::Services;
@@ -22,7 +22,7 @@ use crate::ports::writer::SliceWriter;
 
 /// Messages of a repetition, in the order of publication: one at a time, because each costs the loop a part
 /// of a millisecond, and longer if it is large.
-const MESSAGE_COUNT: usize = 9;
+const MESSAGE_COUNT: usize = 10;
 
 /// Progress of the repetition.
 #[derive(Debug, Default)]
@@ -64,18 +64,19 @@ impl Repetition {
         let _left_out = match index {
             0 => replace(&writers.scene, config, &services.scene, &SCENE),
             1 => replace(&writers.topology, config, &services.topology, &TOPOLOGY),
-            2 => replace(&writers.surface, config, &services.surface, &SURFACE),
-            3 => repeat(&writers.colliders, &services.colliders, &COLLIDERS),
-            4 => repeat(&writers.tears, &services.tears, &TEARS),
-            5 => repeat(&writers.parameters, &services.parameters, &PARAMETERS),
+            2 => replace(&writers.bends, config, &services.bends, &BENDS),
+            3 => replace(&writers.surface, config, &services.surface, &SURFACE),
+            4 => repeat(&writers.colliders, &services.colliders, &COLLIDERS),
+            5 => repeat(&writers.tears, &services.tears, &TEARS),
+            6 => repeat(&writers.parameters, &services.parameters, &PARAMETERS),
             _ if self.has_new_snapshot.get() => Ok(()),
             // The owner is paused.
-            6 => writers
+            7 => writers
                 .forces
                 .borrow()
                 .iter()
                 .try_for_each(|writer| repeat(writer, &services.forces, &FORCES)),
-            7 => repeat(&writers.keyframe, &services.keyframe, &KEYFRAME),
+            8 => repeat(&writers.keyframe, &services.keyframe, &KEYFRAME),
             _ => repeat(&writers.particles, &services.particles, &PARTICLES),
         };
         let is_last = index + 1 == MESSAGE_COUNT;
@@ -145,15 +146,25 @@ mod tests {
     use crate::client::tap::Tap;
     use crate::messages::ready::Ready;
     use crate::messages::snapshot::SnapshotHeader;
-    use crate::messages::topology::{ConstraintState, LoadHeader, Triangle};
+    use crate::messages::topology::{BendState, ConstraintState, LoadHeader, Triangle};
     use crate::owner::Owner;
     use crate::owner::load::Load;
     use crate::ports::reader::SliceReader;
-    use crate::ports::service::{READY, SCENE, SURFACE, TEARS, TOPOLOGY};
+    use crate::ports::service::{BENDS, READY, SCENE, SURFACE, TEARS, TOPOLOGY};
     use crate::ports::services::Services;
     use crate::ports::session::{Access, Session};
     use crate::ports::writer::ValueWriter;
     use crate::testing::TestDomain;
+
+    const BENT: BendState = BendState {
+        particles: [0, 1, 2, 1],
+        coefficients: [1.0, -2.0, 1.0, 0.0],
+        geometry: 0.5,
+        rigidity: 0.25,
+        rest: 0.0,
+        shape: 0,
+        block: 0,
+    };
 
     const LOAD: Load<'_> = Load {
         header: LoadHeader {
@@ -170,6 +181,7 @@ mod tests {
         },
         scene: b"version = 1",
         constraints: &[ConstraintState { a: 0, b: 1, rest_length: 1.0, compliance: 0.0, kind: 0 }],
+        bends: &[BENT],
         triangles: &[Triangle { corners: [0, 1, 2] }],
         collider_count: 0,
         keyframe_size_bytes_max: 0,
@@ -195,12 +207,14 @@ mod tests {
         let services = Services::access(&session, Access::Open).unwrap();
         let scene = SliceReader::create(&services.scene, &SCENE).unwrap();
         let topology = SliceReader::create(&services.topology, &TOPOLOGY).unwrap();
+        let bends = SliceReader::create(&services.bends, &BENDS).unwrap();
         let surface = SliceReader::create(&services.surface, &SURFACE).unwrap();
         let tears = SliceReader::create(&services.tears, &TEARS).unwrap();
         refresh_all(&owner);
         let first = topology.next().unwrap().unwrap();
         for is_none in [
             scene.newest().unwrap().is_none(),
+            bends.newest().unwrap().is_none(),
             surface.newest().unwrap().is_none(),
             tears.newest().unwrap().is_none(),
         ] {
@@ -218,6 +232,7 @@ mod tests {
             let again = topology.next().unwrap().unwrap();
             assert_eq!(again.user_header(), first.user_header());
             assert_eq!(again.payload(), LOAD.constraints);
+            assert_eq!(bends.next().unwrap().unwrap().payload(), LOAD.bends);
             assert_eq!(surface.next().unwrap().unwrap().payload(), LOAD.triangles);
             assert_eq!(tears.next().unwrap().unwrap().payload(), []);
         }

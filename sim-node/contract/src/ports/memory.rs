@@ -105,6 +105,7 @@ mod tests {
             header: LoadHeader { particle_count, ..LoadHeader::default() },
             scene: b"version = 1",
             constraints: &constraints,
+            bends: &[],
             triangles: &[],
             collider_count: 2,
             keyframe_size_bytes_max: 20_000,
@@ -123,7 +124,7 @@ mod tests {
             assert!(allocated_bytes >= file.len(), "{}: {allocated_bytes} bytes", path.display());
             segment_count += 1;
         }
-        // Eight of the load, outcomes, status, and the client's commands.
-        assert_eq!(segment_count, 11);
+        // Nine of the load, outcomes, status, and the client's commands.
+        assert_eq!(segment_count, 12);
     }
 }

@@ -70,6 +70,7 @@ pub(crate) const PARTICLES: ServiceSpec = ServiceSpec {
 pub(crate) const KEYFRAME: ServiceSpec =
     ServiceSpec { suffix: "keyframe", buffered: KEYFRAMES_BUFFERED, ..LATCHED };
 pub(crate) const TOPOLOGY: ServiceSpec = ServiceSpec { suffix: "topology", ..LATCHED };
+pub(crate) const BENDS: ServiceSpec = ServiceSpec { suffix: "bends", ..LATCHED };
 pub(crate) const SURFACE: ServiceSpec = ServiceSpec { suffix: "surface", ..LATCHED };
 pub(crate) const SCENE: ServiceSpec = ServiceSpec { suffix: "scene", ..LATCHED };
 pub(crate) const TEARS: ServiceSpec = ServiceSpec { suffix: "tears", ..LATCHED };
@@ -129,10 +130,11 @@ pub(crate) const WAKE: ServiceSpec = ServiceSpec {
 };
 
 /// All services of a name.
-pub(crate) const SERVICES: [&ServiceSpec; 15] = [
+pub(crate) const SERVICES: [&ServiceSpec; 16] = [
     &PARTICLES,
     &KEYFRAME,
     &TOPOLOGY,
+    &BENDS,
     &SURFACE,
     &SCENE,
     &TEARS,

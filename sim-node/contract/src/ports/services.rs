@@ -18,14 +18,14 @@ use crate::messages::restore::RestoreHeader;
 use crate::messages::snapshot::{ParticleState, SnapshotHeader};
 use crate::messages::status::NodeStatus;
 use crate::messages::tears::{TearsHeader, TornConstraint};
-use crate::messages::topology::{ConstraintState, KeyframeHeader, LoadHeader, Triangle};
+use crate::messages::topology::{BendState, ConstraintState, KeyframeHeader, LoadHeader, Triangle};
 use crate::ports::domain::orphans::{self, Port};
 use crate::ports::domain::owner_lock::OwnerLock;
 use crate::ports::mirror::Mirror;
 use crate::ports::port::reader_count;
 use crate::ports::service::{
-    COLLIDERS, COMMANDS, FORCES, KEYFRAME, OUTCOMES, PARAMETERS, PARTICLES, READY, RESTORE, SCENE,
-    STATUS, SURFACE, ServiceError, TEARS, TOPOLOGY,
+    BENDS, COLLIDERS, COMMANDS, FORCES, KEYFRAME, OUTCOMES, PARAMETERS, PARTICLES, READY, RESTORE,
+    SCENE, STATUS, SURFACE, ServiceError, TEARS, TOPOLOGY,
 };
 use crate::ports::session::{Access, Events, Session, Slices, Values};
 use crate::ports::source::{is_mirror, owner_nodes};
@@ -38,6 +38,7 @@ pub(crate) struct Services {
     pub(crate) particles: Slices<ParticleState, SnapshotHeader>,
     pub(crate) keyframe: Slices<u8, KeyframeHeader>,
     pub(crate) topology: Slices<ConstraintState, LoadHeader>,
+    pub(crate) bends: Slices<BendState, LoadHeader>,
     pub(crate) surface: Slices<Triangle, LoadHeader>,
     pub(crate) scene: Slices<u8, LoadHeader>,
     pub(crate) tears: Slices<TornConstraint, TearsHeader>,
@@ -60,6 +61,7 @@ impl Services {
             particles: session.slices(&PARTICLES, access)?,
             keyframe: session.slices(&KEYFRAME, access)?,
             topology: session.slices(&TOPOLOGY, access)?,
+            bends: session.slices(&BENDS, access)?,
             surface: session.slices(&SURFACE, access)?,
             scene: session.slices(&SCENE, access)?,
             tears: session.slices(&TEARS, access)?,
@@ -82,6 +84,7 @@ impl Services {
             orphans::ports(&self.particles),
             orphans::ports(&self.keyframe),
             orphans::ports(&self.topology),
+            orphans::ports(&self.bends),
             orphans::ports(&self.surface),
             orphans::ports(&self.scene),
             orphans::ports(&self.tears),
@@ -109,6 +112,7 @@ impl Services {
         reader_count(&self.particles)
             + reader_count(&self.keyframe)
             + reader_count(&self.topology)
+            + reader_count(&self.bends)
             + reader_count(&self.surface)
             + reader_count(&self.scene)
             + reader_count(&self.tears)
@@ -331,6 +335,7 @@ mod tests {
         },
         scene: b"",
         constraints: &[],
+        bends: &[],
         triangles: &[],
         collider_count: 0,
         keyframe_size_bytes_max: 0,
@@ -349,7 +354,7 @@ mod tests {
         let error = Attachment::open(join(&domain, CONTRACT_VERSION + 1)).unwrap_err();
         assert_eq!(
             error.to_string(),
-            "service 'sim/status' has contract version 4, but this program has 5: stop every \
+            "service 'sim/status' has contract version 5, but this program has 6: stop every \
              program of the other version, or start this one with another --domain"
         );
     }
@@ -363,8 +368,8 @@ mod tests {
         let new = Owner::create_with_version(&domain.endpoint(), CONTRACT_VERSION + 1, &EMPTY);
         let error = ServiceError::Version {
             service: "sim/status".to_owned(),
-            actual: "4".to_owned(),
-            expected: 5,
+            actual: "5".to_owned(),
+            expected: 6,
         };
         assert_eq!(new.unwrap_err(), OwnerError::Service(error));
         // Without clients, the services of the other version are gone.

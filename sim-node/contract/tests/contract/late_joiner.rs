@@ -7,12 +7,12 @@ use sim_contract::testing::TestDomain;
 use sim_contract::{Client, Tap, TearCause, TearsHeader, TornConstraint, Update};
 
 use crate::support::{
-    DEADLINE, MOMENT, PARTICLE_COUNT, RUN_ID, SCENE, colliders, constraints, create_owner,
+    DEADLINE, MOMENT, PARTICLE_COUNT, RUN_ID, SCENE, bends, colliders, constraints, create_owner,
     parameters, particle, publish_colliders, publish_everything, publish_step, triangles,
 };
 
 #[test]
-fn a_late_reader_receives_topology_surface_scene_and_the_last_snapshot() {
+fn a_late_reader_receives_topology_bends_surface_scene_and_the_last_snapshot() {
     let domain = TestDomain::new();
     let owner = create_owner(&domain.endpoint()).unwrap();
     publish_everything(&owner, 0);
@@ -24,6 +24,8 @@ fn a_late_reader_receives_topology_surface_scene_and_the_last_snapshot() {
         let topology = client.topology(DEADLINE).unwrap().unwrap();
         assert_eq!(topology.constraints, constraints());
         assert_eq!(topology.header.count, 3);
+        let list = client.bends(DEADLINE).unwrap().unwrap();
+        assert_eq!((list.header.count, list.bends), (2, bends()));
         let surface = client.surface(DEADLINE).unwrap().unwrap();
         assert_eq!(surface.triangles, triangles());
         assert_eq!(surface.header.particle_count, PARTICLE_COUNT);
@@ -61,6 +63,7 @@ fn a_late_tap_receives_every_kind_of_message() {
         kinds.push(match *message {
             Update::Scene(_, text) if text == SCENE.as_bytes() => "scene",
             Update::Topology(_, list) if list == constraints() => "topology",
+            Update::Bends(_, list) if list == bends() => "bends",
             Update::Surface(_, list) if list == triangles() => "surface",
             Update::Colliders(header, list) if list == colliders(header.step) => "colliders",
             Update::Tears(header, [torn]) if header.count == 1 && *torn == cut => "tears",
@@ -72,8 +75,17 @@ fn a_late_tap_receives_every_kind_of_message() {
     });
     let state = state.unwrap();
     assert_eq!((state.header.step, state.particles[2]), (5, particle(5, 2)));
-    let expected =
-        ["scene", "topology", "surface", "colliders", "tears", "parameters", "keyframe", "status"];
+    let expected = [
+        "scene",
+        "topology",
+        "bends",
+        "surface",
+        "colliders",
+        "tears",
+        "parameters",
+        "keyframe",
+        "status",
+    ];
     assert_eq!(kinds, expected);
     assert!(tap.next_state(|_| {}).is_none());
 }

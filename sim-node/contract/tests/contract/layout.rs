@@ -7,7 +7,7 @@ use std::mem::offset_of;
 
 use iceoryx2::service::static_config::message_type_details::{TypeDetail, TypeVariant};
 use sim_contract::{
-    ColliderState, CollidersHeader, Command, ConstraintState, ForceRow, ForcesHeader,
+    BendState, ColliderState, CollidersHeader, Command, ConstraintState, ForceRow, ForcesHeader,
     KeyframeHeader, LoadHeader, MemberChange, MemberChanges, MemberStatus, NodeStatus, Outcome,
     ParameterState, ParametersHeader, ParticleState, Ready, RestoreHeader, SnapshotHeader,
     TearsHeader, TornConstraint, Triangle, Wake,
@@ -74,6 +74,7 @@ fn write_state_layouts(text: &mut String) {
         }
     );
     layout!(text, ConstraintState { a, b, rest_length, compliance, kind });
+    layout!(text, BendState { particles, coefficients, geometry, rigidity, rest, shape, block });
     layout!(text, Triangle { corners });
     layout!(
         text,

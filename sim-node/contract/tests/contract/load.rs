@@ -3,9 +3,9 @@
 
 use sim_contract::testing::TestDomain;
 use sim_contract::{
-    COLLIDERS_MAX, Client, ColliderShape, ColliderState, CollidersHeader, ConstraintState,
-    KeyframeHeader, Load, LoadHeader, Owner, ParameterValues, ParticleState, SnapshotHeader, Tap,
-    TearCause, TearsHeader, TornConstraint, Triangle, Update, Wake,
+    BendState, COLLIDERS_MAX, Client, ColliderShape, ColliderState, CollidersHeader,
+    ConstraintState, KeyframeHeader, Load, LoadHeader, Owner, ParameterValues, ParticleState,
+    SnapshotHeader, Tap, TearCause, TearsHeader, TornConstraint, Triangle, Update, Wake,
 };
 
 use crate::support::{
@@ -27,6 +27,7 @@ fn with_new_load(receive: impl FnOnce(&Load<'_>)) {
         header,
         scene: NEW_SCENE.as_bytes(),
         constraints: &constraints,
+        bends: &[BendState::default(); 4],
         triangles: &[Triangle { corners: [6, 7, 8] }; 3],
         collider_count: 3,
         keyframe_size_bytes_max: 64,
@@ -69,6 +70,7 @@ fn sphere() -> ColliderState {
 /// Connects a client to all services, and lets the owner notice it.
 fn connect(client: &mut Client, owner: &Owner) {
     client.topology(MOMENT).unwrap();
+    client.bends(MOMENT).unwrap();
     client.surface(MOMENT).unwrap();
     client.scene(MOMENT).unwrap();
     client.torn(MOMENT).unwrap();
@@ -81,6 +83,7 @@ fn connect(client: &mut Client, owner: &Owner) {
 fn assert_reads_new_load(client: &mut Client) {
     let topology = client.topology(DEADLINE).unwrap().unwrap();
     assert_eq!((topology.header.topology_revision, topology.constraints.len()), (2, 8));
+    assert_eq!(client.bends(DEADLINE).unwrap().unwrap().bends.len(), 4);
     assert_eq!(client.surface(DEADLINE).unwrap().unwrap().triangles.len(), 3);
     assert_eq!(client.scene(DEADLINE).unwrap().unwrap(), NEW_SCENE);
     let snapshot = client.latest_snapshot(DEADLINE).unwrap().unwrap();
@@ -180,6 +183,7 @@ fn a_late_reader_receives_nothing_of_the_old_load() {
         kinds.push(match *message {
             Update::Scene(_, text) if text == NEW_SCENE.as_bytes() => "scene",
             Update::Topology(header, _) if header.topology_revision == 2 => "topology",
+            Update::Bends(header, _) if header.topology_revision == 2 => "bends",
             Update::Surface(header, _) if header.topology_revision == 2 => "surface",
             Update::Tears(_, []) => "tears",
             Update::Parameters(_, values) if *values == ParameterValues::default() => "parameters",
@@ -188,7 +192,7 @@ fn a_late_reader_receives_nothing_of_the_old_load() {
         });
     });
     assert!(state.is_none());
-    assert_eq!(kinds, ["scene", "topology", "surface", "tears", "parameters", "status"]);
+    assert_eq!(kinds, ["scene", "topology", "bends", "surface", "tears", "parameters", "status"]);
 
     publish_new_step(&owner, 6);
     let mut late = Client::attach(&domain.endpoint()).unwrap();
@@ -236,6 +240,7 @@ fn with_colliders(collider_count: usize) -> Load<'static> {
         header: LoadHeader::default(),
         scene: b"version = 1",
         constraints: &[],
+        bends: &[],
         triangles: &[],
         collider_count,
         keyframe_size_bytes_max: 0,

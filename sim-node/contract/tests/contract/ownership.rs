@@ -132,6 +132,7 @@ fn a_client_stays_connected_when_a_new_owner_claims_the_name() {
         header: sim_contract::LoadHeader { topology_revision: 2, ..load_header() },
         scene: b"",
         constraints: &constraints(),
+        bends: &[],
         triangles: &triangles(),
         collider_count: 0,
         keyframe_size_bytes_max: 0,

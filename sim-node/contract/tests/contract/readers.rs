@@ -89,11 +89,14 @@ fn an_empty_scene_works() {
         owner.refresh();
     };
     let mut client = Client::attach(&domain.endpoint()).unwrap();
+    assert!(client.bends(MOMENT).unwrap().is_none());
     assert!(client.surface(MOMENT).unwrap().is_none());
     assert!(client.topology(MOMENT).unwrap().is_none());
     assert!(client.scene(MOMENT).unwrap().is_none());
     assert!(client.next_snapshot(MOMENT).unwrap().is_none());
     publish();
+    let bends = client.bends(MOMENT).unwrap().unwrap();
+    assert_eq!((bends.header.count, bends.bends.len()), (0, 0));
     let surface = client.surface(MOMENT).unwrap().unwrap();
     assert_eq!((surface.header.count, surface.triangles.len()), (0, 0));
     assert!(client.topology(MOMENT).unwrap().unwrap().constraints.is_empty());

@@ -6,8 +6,8 @@ use sim_contract::testing::TestDomain;
 use sim_contract::{Action, Change, Command, Outcome, Tap, TearCause, TornConstraint, Update};
 
 use crate::support::{
-    PARTICLE_COUNT, RUN_ID, SCENE, colliders, constraints, create_owner, parameters, particle,
-    publish_everything, publish_step, triangles,
+    PARTICLE_COUNT, RUN_ID, SCENE, bends, colliders, constraints, create_owner, parameters,
+    particle, publish_everything, publish_step, triangles,
 };
 
 const CUT: TornConstraint = TornConstraint { constraint: 2, cause: TearCause::Cut as u32 };
@@ -28,6 +28,7 @@ fn a_state_contains_all_messages_up_to_it() {
     assert_eq!((first.header.step, first.particles.len()), (0, PARTICLE_COUNT as usize));
     assert_eq!(first.load.scene, SCENE.as_bytes());
     assert_eq!(first.load.constraints, constraints());
+    assert_eq!(first.load.bends, bends());
     assert_eq!(first.load.triangles, triangles());
     assert!(first.torn.constraints.is_empty() && first.colliders.colliders.is_empty());
     assert_eq!(first.parameters.values, parameters(0));

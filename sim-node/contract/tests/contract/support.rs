@@ -3,10 +3,10 @@
 use std::time::Duration;
 
 use sim_contract::{
-    CONTRACT_VERSION, ColliderShape, ColliderState, CollidersHeader, ConstraintState, Endpoint,
-    KeyframeHeader, Load, LoadHeader, NodeStatus, Outcome, Owner, OwnerError, ParameterValues,
-    ParticleState, Reason, ReceivedCommand, SnapshotHeader, TearCause, TearsHeader, TornConstraint,
-    Triangle, Wake,
+    BendState, CONTRACT_VERSION, ColliderShape, ColliderState, CollidersHeader, ConstraintState,
+    Endpoint, KeyframeHeader, Load, LoadHeader, NodeStatus, Outcome, Owner, OwnerError,
+    ParameterValues, ParticleState, Reason, ReceivedCommand, SnapshotHeader, TearCause,
+    TearsHeader, TornConstraint, Triangle, Wake,
 };
 
 /// Longer than any operation here takes. Tests wait for events, not for this deadline.
@@ -35,6 +35,18 @@ pub(crate) fn constraints() -> Vec<ConstraintState> {
     (0..PARTICLE_COUNT - 1).map(constraint).collect()
 }
 
+pub(crate) fn bends() -> Vec<BendState> {
+    let line = BendState {
+        particles: [0, 1, 2, 1],
+        coefficients: [1.0, -2.0, 1.0, 0.0],
+        geometry: 1e-3,
+        rigidity: 0.02,
+        block: -1,
+        ..BendState::default()
+    };
+    vec![line, BendState { particles: [1, 2, 3, 2], block: 0, ..line }]
+}
+
 pub(crate) fn triangles() -> Vec<Triangle> {
     vec![Triangle { corners: [0, 1, 2] }, Triangle { corners: [1, 2, 3] }]
 }
@@ -44,6 +56,7 @@ pub(crate) fn create_owner(endpoint: &Endpoint) -> Result<Owner, OwnerError> {
         header: load_header(),
         scene: SCENE.as_bytes(),
         constraints: &constraints(),
+        bends: &bends(),
         triangles: &triangles(),
         collider_count: COLLIDER_COUNT,
         keyframe_size_bytes_max: 16,

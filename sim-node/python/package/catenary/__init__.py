@@ -22,6 +22,7 @@ from os import PathLike, fspath
 from catenary._catenary import (
     Action,
     AnchorForces,
+    Bends,
     ColliderForces,
     Forces,
     Outcome,
@@ -48,6 +49,7 @@ from catenary._simulation import Simulation
 
 __all__ = [
     "ANCHORED",
+    "BEND_SHAPES",
     "CONSTRAINT_KINDS",
     "FROZEN",
     "GRABBED",
@@ -56,6 +58,7 @@ __all__ = [
     "AnchorForces",
     "Arrays",
     "Batch",
+    "Bends",
     "ColliderForces",
     "Error",
     "Forces",
@@ -87,6 +90,8 @@ PINNED, GRABBED, ANCHORED, FROZEN = 1, 2, 4, 8
 """Bits of `Snapshot.flags`."""
 CONSTRAINT_KINDS = ("structural", "shear", "bend", "tether")
 """Names of the numbers in `Topology.kinds`."""
+BEND_SHAPES = ("line", "cell", "hinge")
+"""Names of the numbers in `Bends.shapes`."""
 
 
 def attach(

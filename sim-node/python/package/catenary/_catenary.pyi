@@ -4,6 +4,7 @@ from os import PathLike
 from types import TracebackType
 from typing import Any, Literal, Self, final
 
+import numpy as np
 import numpy.typing as npt
 
 from catenary._types import Floats, Vector, Wholes
@@ -11,6 +12,7 @@ from catenary._types import Floats, Vector, Wholes
 __all__ = [
     "Action",
     "AnchorForces",
+    "Bends",
     "ColliderForces",
     "Forces",
     "Lockstep",
@@ -148,6 +150,38 @@ class Topology:
     @property
     def scene_hash(self) -> int:
         """Hash of the scene: a state belongs to the scene with the same one."""
+    def __len__(self) -> int: ...
+
+@final
+class Bends:
+    """The bends of a scene, as loaded: resistance to curvature.
+
+    With C the sum of c x over the particles of a bend, its energy in J is |C - rest n|^2 rigidity / (2 geometry),
+    where n is the unit vector along the sum of the unit normals of a hinge's triangles.
+    """
+
+    @property
+    def particles(self) -> Wholes:
+        """Indices of the four particles of each bend. The fourth of a bend of three is its second one again.
+        Shape: (bends, 4)."""
+    @property
+    def coefficients(self) -> Floats:
+        """Coefficients c of the particles. The fourth of a bend of three is 0. Shape: (bends, 4)."""
+    @property
+    def geometries(self) -> Floats:
+        """Compliances times rigidities: m² on a surface, m³ on a line. Shape: (bends,)."""
+    @property
+    def rigidities(self) -> Floats:
+        """Bending rigidities of the scene: N m on a surface, N m² on a line. Shape: (bends,)."""
+    @property
+    def rests(self) -> Floats:
+        """C along n at rest in metres; other than 0 only for hinges that are folded at rest. Shape: (bends,)."""
+    @property
+    def shapes(self) -> Wholes:
+        """Shapes: indices into BEND_SHAPES. Shape: (bends,)."""
+    @property
+    def blocks(self) -> npt.NDArray[np.int32]:
+        """Indices of the [[generate]] blocks that they come from; -1 for explicit bends. Shape: (bends,)."""
     def __len__(self) -> int: ...
 
 @final
@@ -361,6 +395,8 @@ class Node:
         """Returns the newest complete state, which `restore` puts in place again."""
     def topology(self) -> Topology:
         """Returns the constraints."""
+    def bends(self) -> Bends:
+        """Returns the bends."""
     def surface(self) -> Wholes:
         """Returns the particles of each triangle of the surface. Shape: (triangles, 3)."""
     def scene(self) -> str:
@@ -458,6 +494,8 @@ class Simulation:
         """Returns the scene as TOML, with every default written out."""
     def topology(self) -> Topology:
         """Returns the constraints."""
+    def bends(self) -> Bends:
+        """Returns the bends."""
     def surface(self) -> Wholes:
         """Returns the particles of each triangle of the surface. Shape: (triangles, 3)."""
     def parameters(self) -> dict[str, Any]:
@@ -519,6 +557,8 @@ class Recording:
         """Returns the scene as TOML."""
     def topology(self) -> Topology:
         """Returns the constraints."""
+    def bends(self) -> Bends:
+        """Returns the bends. A recording of format 5 or earlier does not list them."""
     def surface(self) -> Wholes:
         """Returns the particles of each triangle of the surface. Shape: (triangles, 3)."""
     def at_or_before(self, step: int) -> Snapshot:

@@ -5,7 +5,7 @@ use std::path::Path;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use recorder::LogReader;
-use sim_contract::{ConstraintState, LoadHeader, Method, Triangle, read_scene_file};
+use sim_contract::{BendState, ConstraintState, LoadHeader, Method, Triangle, read_scene_file};
 use sim_solver::{Scene, SceneError, builtin};
 
 use crate::convert::rows;
@@ -75,12 +75,12 @@ impl Topology {
     }
 }
 
-fn column<T: numpy::Element>(
+fn column<S, T: numpy::Element>(
     py: Python<'_>,
-    constraints: &[ConstraintState],
-    field: impl Fn(&ConstraintState) -> T,
+    states: &[S],
+    field: impl Fn(&S) -> T,
 ) -> Py<PyArray1<T>> {
-    PyArray1::from_iter(py, constraints.iter().map(field)).unbind()
+    PyArray1::from_iter(py, states.iter().map(field)).unbind()
 }
 
 #[pymethods]
@@ -91,6 +91,57 @@ impl Topology {
 
     fn __repr__(&self, py: Python<'_>) -> String {
         format!("<catenary.Topology: {} constraints>", self.__len__(py))
+    }
+}
+
+/// The bends of a scene, as loaded: resistance to curvature.
+///
+/// With C the sum of c x over the particles of a bend, its energy in J is |C - rest n|^2 rigidity / (2 geometry),
+/// where n is the unit vector along the sum of the unit normals of a hinge's triangles.
+#[pyclass(frozen, get_all, module = "catenary")]
+#[derive(Debug)]
+pub(crate) struct Bends {
+    /// Indices of the four particles of each bend. The fourth of a bend of three is its second one again.
+    /// Shape: (bends, 4).
+    particles: Py<PyArray2<u32>>,
+    /// Coefficients c of the particles. The fourth of a bend of three is 0. Shape: (bends, 4).
+    coefficients: Py<PyArray2<f32>>,
+    /// Compliances times rigidities: m² on a surface, m³ on a line. Shape: (bends,).
+    geometries: Py<PyArray1<f32>>,
+    /// Bending rigidities of the scene: N m on a surface, N m² on a line. Shape: (bends,).
+    rigidities: Py<PyArray1<f32>>,
+    /// C along n at rest in metres; other than 0 only for hinges that are folded at rest. Shape: (bends,).
+    rests: Py<PyArray1<f32>>,
+    /// Shapes: indices into BEND_SHAPES. Shape: (bends,).
+    shapes: Py<PyArray1<u32>>,
+    /// Indices of the [[generate]] blocks that they come from; -1 for explicit bends. Shape: (bends,).
+    blocks: Py<PyArray1<i32>>,
+}
+
+impl Bends {
+    pub(crate) fn new(py: Python<'_>, bends: &[BendState]) -> PyResult<Self> {
+        let particles: Vec<_> = bends.iter().map(|one| one.particles).collect();
+        let coefficients: Vec<_> = bends.iter().map(|one| one.coefficients).collect();
+        Ok(Self {
+            particles: rows(py, &particles)?.unbind(),
+            coefficients: rows(py, &coefficients)?.unbind(),
+            geometries: column(py, bends, |one| one.geometry),
+            rigidities: column(py, bends, |one| one.rigidity),
+            rests: column(py, bends, |one| one.rest),
+            shapes: column(py, bends, |one| one.shape),
+            blocks: column(py, bends, |one| one.block),
+        })
+    }
+}
+
+#[pymethods]
+impl Bends {
+    fn __len__(&self, py: Python<'_>) -> usize {
+        self.shapes.bind(py).len().unwrap_or(0)
+    }
+
+    fn __repr__(&self, py: Python<'_>) -> String {
+        format!("<catenary.Bends: {} bends>", self.__len__(py))
     }
 }
 

@@ -32,6 +32,8 @@ pub struct Bend {
     pub rigidity: f32,
     /// Arrangement of the particles.
     pub shape: BendShape,
+    /// Index of the generated block that it comes from. None for an explicit bend.
+    pub block: Option<u32>,
 }
 
 /// Arrangement of the particles of a bend.
@@ -52,6 +54,25 @@ pub enum BendShape {
         /// Area of the first triangle / area of the second.
         area_ratio: f32,
     },
+}
+
+impl BendShape {
+    /// Returns its number in the messages of a node: 0 line, 1 cell, 2 hinge.
+    pub const fn number(self) -> u32 {
+        match self {
+            Self::Line => 0,
+            Self::Cell => 1,
+            Self::Hinge { .. } => 2,
+        }
+    }
+
+    /// Returns the rest value in m. Other than 0 only for a hinge that is folded at rest.
+    pub const fn rest(self) -> f32 {
+        match self {
+            Self::Line | Self::Cell => 0.0,
+            Self::Hinge { rest, .. } => rest,
+        }
+    }
 }
 
 /// Shape in which hinges are at rest.
@@ -90,6 +111,7 @@ impl Bend {
             geometry: round(mean * mean * mean),
             rigidity,
             shape: BendShape::Line,
+            block: None,
         }
     }
 
@@ -98,7 +120,8 @@ impl Bend {
         let [a, b, c, _] = positions.map(|one| Vec3::from_array(one).as_dvec3());
         let area = (b - a).cross(c - a).length();
         let geometry = round(area / 2.0);
-        Self { particles, coefficients: TWIST, geometry, rigidity, shape: BendShape::Cell }
+        let shape = BendShape::Cell;
+        Self { particles, coefficients: TWIST, geometry, rigidity, shape, block: None }
     }
 
     /// Pairs of particles, as positions in [`Self::particles`], whose constraints form the path of a

@@ -21,6 +21,8 @@ pub(crate) struct Model {
     limits: Vec<Limits>,
     /// By constraint: index into `limits`.
     limit_indices: Vec<u32>,
+    /// Block of the bends that are pushed.
+    block: Option<u32>,
     pub(crate) bends: Vec<Bend>,
     /// By bend: the group of independent bends that its shape declares.
     pub(crate) bend_families: Vec<Option<u32>>,
@@ -43,6 +45,11 @@ impl Model {
         if self.limits.last() != Some(&limits) {
             self.limits.push(limits);
         }
+    }
+
+    /// Sets the generated block of the bends that are pushed from now on.
+    pub(crate) fn set_block(&mut self, block: u32) {
+        self.block = Some(block);
     }
 
     /// Returns the limits of a constraint that replace the scene's.
@@ -89,7 +96,7 @@ impl Model {
 
     /// Adds a bend, with the family that its shape declares.
     pub(crate) fn push_bend(&mut self, bend: Bend, family: Option<u32>) {
-        self.bends.push(bend);
+        self.bends.push(Bend { block: self.block, ..bend });
         self.bend_families.push(family);
     }
 

@@ -1,7 +1,8 @@
 //! Messages that are published once per load.
 
 use sim_contract::{
-    ColliderState, ConstraintState, Load, LoadHeader, ParameterValues, Triangle, scene_hash,
+    BendState, ColliderState, ConstraintState, Load, LoadHeader, ParameterValues, Triangle,
+    scene_hash,
 };
 use sim_solver::{PlacedCollider, Scene, Solver};
 
@@ -22,6 +23,7 @@ pub(in crate::node) struct LoadMessages {
     header: LoadHeader,
     text: String,
     constraints: Vec<ConstraintState>,
+    bends: Vec<BendState>,
     triangles: Vec<Triangle>,
     collider_count: usize,
     keyframe_size_bytes_max: usize,
@@ -41,6 +43,7 @@ impl LoadMessages {
             },
             text,
             constraints: solver.constraints().map(to_constraint_state).collect(),
+            bends: solver.bends().map(to_bend_state).collect(),
             triangles: solver.triangles().iter().map(|&corners| Triangle { corners }).collect(),
             collider_count: solver.collider_count(),
             keyframe_size_bytes_max: solver.keyframe_size_bytes_max(),
@@ -59,6 +62,7 @@ impl LoadMessages {
             header: LoadHeader { run_id, step, topology_revision, ..self.header },
             scene: self.text.as_bytes(),
             constraints: &self.constraints,
+            bends: &self.bends,
             triangles: &self.triangles,
             collider_count: self.collider_count,
             keyframe_size_bytes_max: self.keyframe_size_bytes_max,
@@ -85,6 +89,18 @@ fn to_constraint_state(constraint: sim_solver::Constraint) -> ConstraintState {
         rest_length: constraint.rest_length,
         compliance: constraint.compliance,
         kind: constraint.kind as u32,
+    }
+}
+
+fn to_bend_state(bend: sim_solver::Bend) -> BendState {
+    BendState {
+        particles: bend.particles,
+        coefficients: bend.coefficients,
+        geometry: bend.geometry,
+        rigidity: bend.rigidity,
+        rest: bend.shape.rest(),
+        shape: bend.shape.number(),
+        block: bend.block.and_then(|block| i32::try_from(block).ok()).unwrap_or(-1),
     }
 }
 

@@ -93,6 +93,7 @@ fn read_load(loaded: &LoadedScene) -> Result<Load, LoadError> {
         header: loaded.header,
         summary: SceneSummary::from_toml(&text).unwrap_or_default(),
         constraints: loaded.constraints.clone(),
+        bends: loaded.bends.clone(),
         triangles: loaded.triangles.clone(),
     };
     load.checked(loaded.header.particle_count)

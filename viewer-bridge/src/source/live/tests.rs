@@ -56,6 +56,7 @@ fn load(step: u64, topology_revision: u32) -> OwnerLoad<'static> {
         },
         scene: b"version = 1",
         constraints: &[STRUT],
+        bends: &[],
         triangles: &[],
         collider_count: 1,
         keyframe_size_bytes_max: 4096,

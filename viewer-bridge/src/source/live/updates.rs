@@ -42,6 +42,7 @@ impl Updates {
             }
             // The tap returns these with their state.
             Update::Scene(..)
+            | Update::Bends(..)
             | Update::Surface(..)
             | Update::Colliders(..)
             | Update::Tears(..)

@@ -113,9 +113,12 @@ fn load_of(tape: &Tape) -> anyhow::Result<Load> {
     let constraints = topology.constraints();
     let constraints =
         constraints.with_context(|| malformed("the columns of /topology differ in length"))?;
+    let bends = topology.bends();
+    let bends = bends
+        .with_context(|| malformed("the columns of the bends in /topology differ in length"))?;
     let triangles = surface.triangles();
     let triangles = triangles.with_context(|| malformed("/surface ends within a triangle"))?;
-    let load = Load { header, summary, constraints, triangles };
+    let load = Load { header, summary, constraints, bends, triangles };
     load.checked(run.particle_count).map_err(|error| anyhow!(malformed(&error.to_string())))
 }
 

@@ -38,6 +38,7 @@ impl Node {
             header,
             scene: b"version = 1\nname = \"dot\"\nsolver.rate_hz = 10\n".to_vec(),
             constraints: vec![ConstraintState::default()],
+            bends: Vec::new(),
             triangles: Vec::new(),
         };
         Self {

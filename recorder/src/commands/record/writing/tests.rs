@@ -40,6 +40,7 @@ pub(super) fn header() -> RunHeader {
         method: 0,
         particle_count: 1,
         constraint_count: 0,
+        bend_count: 0,
         solver_version: 1,
         contract_version: 1,
         recorder_version: "0".to_owned(),

@@ -87,6 +87,7 @@ impl Hinge {
             geometry: round(self.area() / stiffness),
             rigidity,
             shape: BendShape::Hinge { rest: round(rest), area_ratio: round(first / second) },
+            block: None,
         }
     }
 

@@ -101,6 +101,7 @@ impl Cloth {
             geometry: round(geometry),
             rigidity,
             shape,
+            block: None,
         };
         builder.model.push_bend(bend, Some(family.group(row, column)));
     }

@@ -73,6 +73,7 @@ impl Rope {
                 geometry,
                 rigidity,
                 shape: BendShape::Line,
+                block: None,
             };
             let family = BendFamily::Across.group(0, (index - builder.first) as usize);
             builder.model.push_bend(bend, Some(family));

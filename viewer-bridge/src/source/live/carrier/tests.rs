@@ -44,6 +44,7 @@ impl Stage {
                 header: LoadHeader { rate_hz: RATE_HZ, ..LoadHeader::default() },
                 summary: SceneSummary::from_toml(text).unwrap(),
                 constraints: Vec::new(),
+                bends: Vec::new(),
                 triangles: Vec::new(),
             },
             header: SnapshotHeader { step: u64::from(steps), ..SnapshotHeader::default() },
