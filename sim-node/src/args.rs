@@ -22,7 +22,7 @@ use sim_cli::DocumentVerb;
 use sim_contract::console;
 
 pub(crate) use bench::{BenchArgs, BenchClientArgs, ClientRole};
-pub(crate) use command::{CommandVerb, PoseArgs, RewindArgs};
+pub(crate) use command::{CommandVerb, PoseArgs, RewindArgs, SetArgs};
 pub(crate) use ctl::{CtlArgs, CtlVerb, QueryVerb, WatchArgs};
 pub(crate) use domain::{DoctorArgs, PsArgs};
 use endpoint::EndpointArgs;

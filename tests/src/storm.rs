@@ -220,7 +220,12 @@ fn bad_action(held: &HeldState, rng: &mut Rng) -> Action {
 
 fn set(parameter: &str, value: f32) -> Action {
     let parameter = Text::new(parameter).expect("a short name");
-    Action::Set { parameter, value: ParameterValue::Number(value), constraint_kind: None }
+    Action::Set {
+        parameter,
+        value: ParameterValue::Number(value),
+        constraint_kind: None,
+        block: None,
+    }
 }
 
 /// Returns a state with one fault.

@@ -297,6 +297,7 @@ mod tests {
             r#"{"step":1,"kind":"set","parameter":"gravity"}"#,
             r#"{"step":1,"kind":"set","parameter":7,"value":null}"#,
             r#"{"step":1,"kind":"set","parameter":"x","value":1,"constraint_kind":0}"#,
+            r#"{"step":1,"kind":"set","parameter":"bending","value":1,"block":-1}"#,
             r#"{"step":1,"kind":"load","scene":null}"#,
         ];
         let errors: Vec<_> = wrong.map(|line| error(&format!("\n{line}"))).into();
@@ -325,6 +326,7 @@ mod tests {
         drag.jsonl:2: value: is missing (allowed: a number, three numbers, or null for off)
         drag.jsonl:2: parameter: 7 is invalid (allowed: the name of a parameter, at most 160 bytes)
         drag.jsonl:2: constraint_kind: 0 is invalid (allowed: structural, shear, bend or tether)
+        drag.jsonl:2: block: -1 is invalid (allowed: whole numbers 0..=4294967295)
         drag.jsonl:2: scene: null is invalid (allowed: the name of a scene, at most 160 bytes)
         "#);
     }

@@ -122,10 +122,10 @@ impl<'a, W: Write> StateWriter<'a, W> {
     /// Writes the parameters at the start and after each change.
     fn write_parameters(&mut self, solver: &Solver, step: u64) -> Result<(), WriteError> {
         let values = solver.parameter_values();
-        if self.parameters == Some(values) {
+        if self.parameters.as_ref() == Some(&values) {
             return Ok(());
         }
-        self.parameters = Some(values);
+        self.parameters = Some(values.clone());
         let row = ParametersRow { step, values };
         self.log.write(&Message::Parameters(row), self.run.time_of_step_ns(step))
     }

@@ -328,7 +328,7 @@ typedef struct catenary_client catenary_client;
 // | 13 cut_segment | | from, to, direction | |
 // | 14 move_anchor | anchor | translation | `rotation` |
 // | 15 move_collider | collider | translation | `rotation` |
-// | 16 set | | value, if a vector | `text` parameter, `number` value, `count` constraint kind |
+// | 16 set | block | value, if a vector | `text` parameter, `number` value, `count` constraint kind |
 // | 17 load | | | `text` scene |
 // | 18 rewind | step, low 32 bits | | `count` step, high 32 bits; or `CATENARY_OPTION_BACK` and `count` steps |
 // | 19 restore | hash, low 32 bits | | `count` hash, high 32 bits; `CATENARY_OPTION_STATE` or `CATENARY_OPTION_MOTION` |
@@ -337,7 +337,8 @@ typedef struct catenary_client catenary_client;
 typedef struct {
   // Number of the action in the table above.
   uint32_t kind;
-  // Index of the particle, constraint, anchor or collider.
+  // Index of the particle, constraint, anchor, collider or, if `CommandOptions::BLOCK` is set, generated
+  // block.
   uint32_t index;
   // Random number of the sender, below 2^53 (exact in JSON); `CONSOLE_CLIENT_ID` is the console.
   uint64_t client_id;
@@ -597,13 +598,16 @@ typedef struct {
   uint32_t spare;
 } catenary_parameters_header;
 
-// The value of one parameter: 24 bytes, alignment 4; an element of `parameters`. A parameter with a
-// value for each kind of constraint has one element for each kind.
+// The value of one parameter: 28 bytes, alignment 4; an element of `parameters`. A parameter with a
+// value for each kind of constraint has one element for each kind. `bending` has one element for all bends,
+// and after it one for each generated block with another value.
 typedef struct {
   // A `catenary_parameter` as a number.
   uint32_t parameter;
   // A `catenary_constraint_kind` as a number, for a parameter with a value for each kind; else 0.
   uint32_t constraint_kind;
+  // Index of a generated block, for its `bending`; else -1.
+  int32_t block;
   // Form of the value: 0 is off, 1 a number, 2 three numbers.
   uint32_t form;
   // The number, or the three numbers. Unused components are 0.
@@ -968,6 +972,11 @@ catenary_command catenary_command_set_off(const char *parameter);
 // `catenary_constraint_kind`). Any other command is returned unchanged.
 catenary_command catenary_command_for_kind(catenary_command set, uint32_t constraint_kind);
 
+// Returns a command that sets "bending", for the bends of one generated block only: the index of the
+// `[[generate]]` block in the scene. Any other command is returned unchanged.
+catenary_command catenary_command_for_block(catenary_command set,
+                                            uint32_t block);
+
 // Loads a built-in scene, or a file that the node can read; at most 160 bytes.
 catenary_command catenary_command_load(const char *scene);
 
@@ -1136,7 +1145,7 @@ typedef char catenary_check_triangle[sizeof(catenary_triangle) == 12 ? 1 : -1];
 typedef char catenary_check_tears_header[sizeof(catenary_tears_header) == 32 ? 1 : -1];
 typedef char catenary_check_torn_constraint[sizeof(catenary_torn_constraint) == 8 ? 1 : -1];
 typedef char catenary_check_parameters_header[sizeof(catenary_parameters_header) == 24 ? 1 : -1];
-typedef char catenary_check_parameter_state[sizeof(catenary_parameter_state) == 24 ? 1 : -1];
+typedef char catenary_check_parameter_state[sizeof(catenary_parameter_state) == 28 ? 1 : -1];
 typedef char catenary_check_colliders_header[sizeof(catenary_colliders_header) == 24 ? 1 : -1];
 typedef char catenary_check_collider_state[sizeof(catenary_collider_state) == 120 ? 1 : -1];
 typedef char catenary_check_forces_header[sizeof(catenary_forces_header) == 24 ? 1 : -1];

@@ -237,16 +237,31 @@ pub extern "C" fn catenary_command_for_kind(set: Command, constraint_kind: u32) 
     match set.action() {
         Action::Set { parameter, value, .. } => {
             let constraint_kind = Some(KindFilter::from_number(constraint_kind));
-            command(Some(Action::Set { parameter, value, constraint_kind }))
+            command(Some(Action::Set { parameter, value, constraint_kind, block: None }))
         }
+        _ => set,
+    }
+}
+
+/// Returns a command that sets "bending", for the bends of one generated block only: the index of the
+/// `[[generate]]` block in the scene. Any other command is returned unchanged.
+#[unsafe(no_mangle)]
+pub extern "C" fn catenary_command_for_block(set: Command, block: u32) -> Command {
+    match set.action() {
+        Action::Set { parameter, value, .. } => command(Some(Action::Set {
+            parameter,
+            value,
+            constraint_kind: None,
+            block: Some(block),
+        })),
         _ => set,
     }
 }
 
 fn set(parameter: *const c_char, value: Option<ParameterValue>) -> Command {
     let pair = short_text(parameter).zip(value);
-    let action = |(parameter, value)| Action::Set { parameter, value, constraint_kind: None };
-    command(pair.map(action))
+    let (constraint_kind, block) = (None, None);
+    command(pair.map(|(parameter, value)| Action::Set { parameter, value, constraint_kind, block }))
 }
 
 /// Loads a built-in scene, or a file that the node can read; at most 160 bytes.

@@ -175,7 +175,8 @@ pub extern "C" fn catenary_read_parameters(
         let timeout = timeout(timeout_s)?;
         let read = attached.client.parameters(timeout)?;
         let read = read.ok_or_else(|| attached.nothing(timeout))?;
-        attached.lists.parameters = read.values.settings().map(ParameterState::from).to_vec();
+        attached.lists.parameters =
+            read.values.settings().into_iter().map(ParameterState::from).collect();
         let list = &attached.lists.parameters;
         let (values, value_count) = (list.as_ptr(), list.len());
         write(parameters, Parameters { header: read.header, values, value_count }, "parameters")

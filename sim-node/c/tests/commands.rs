@@ -18,7 +18,7 @@ fn short(text: &str) -> Text {
 }
 
 fn set(parameter: &str, value: ParameterValue) -> Action {
-    Action::Set { parameter: short(parameter), value, constraint_kind: None }
+    Action::Set { parameter: short(parameter), value, constraint_kind: None, block: None }
 }
 
 const ZERO: [f32; 3] = [0.0; 3];
@@ -34,6 +34,14 @@ fn each_function_makes_the_command_of_its_name() {
         parameter: short("compliance"),
         value: ParameterValue::Number(0.5),
         constraint_kind: Some(KindFilter::from_number(2)),
+        block: None,
+    };
+    let bending = catenary_command_set(c"bending".as_ptr(), 0.5);
+    let for_block = Action::Set {
+        parameter: short("bending"),
+        value: ParameterValue::Number(0.5),
+        constraint_kind: None,
+        block: Some(3),
     };
     let cases = [
         (catenary_command_pin(7), Action::Pin { particle: 7 }),
@@ -66,6 +74,8 @@ fn each_function_makes_the_command_of_its_name() {
         (catenary_command_set_off(c"tear_force".as_ptr()), set("tear_force", ParameterValue::Off)),
         (catenary_command_for_kind(number, 2), for_kind),
         (catenary_command_for_kind(catenary_command_pin(7), 2), Action::Pin { particle: 7 }),
+        (catenary_command_for_block(bending, 3), for_block),
+        (catenary_command_for_block(catenary_command_pin(7), 3), Action::Pin { particle: 7 }),
         (catenary_command_load(c"flag".as_ptr()), Action::Load { scene: short("flag") }),
         (
             catenary_command_rewind_to(1 << 40),

@@ -110,7 +110,7 @@ pub use process::file_size::report_file_size_limit;
 pub use process::stop::Stop;
 pub use scratch_domain::ScratchDomain;
 pub use sim_types::{
-    Action, ActionFields, CLIENT_ID_END, COLLIDERS_MAX, COORDINATE_MAX, ColliderFields,
+    Action, ActionFields, BlockValue, CLIENT_ID_END, COLLIDERS_MAX, COORDINATE_MAX, ColliderFields,
     ColliderShape, ConstraintKind, ELEMENTS_MAX, GRAB_OVER_S_DEFAULT, KindFilter, Method,
     NumberRange, OffMeaning, PARAMETERS, Parameter, ParameterInfo, ParameterValue, ParameterValues,
     ParticleFlags, PerKind, PlainF32, Reason, RestoreContents, SCENE_SIZE_BYTES_MAX,

@@ -4,10 +4,12 @@ use sim_types::{COORDINATE_MAX, Method, Reason, STEP_WORK_MAX};
 
 /// Properties of a scene against which values are checked.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Context {
+pub(crate) struct Context<'a> {
     pub(crate) method: Method,
     pub(crate) is_planar: bool,
     pub(crate) has_bends: bool,
+    /// By generated block: it has bends.
+    pub(crate) bent_blocks: &'a [bool],
     pub(crate) size: StepSize,
 }
 

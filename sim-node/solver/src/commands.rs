@@ -11,7 +11,7 @@ use sim_types::{ConstraintKind, ParameterValue, ParticleFlags, Reason};
 use crate::checks::{check_finite, is_near};
 use crate::contacts::bodies::driven_body::BodyMotion;
 use crate::frame::{Frame, Pose};
-use crate::parameters::Affected;
+use crate::parameters::{Affected, Target};
 use crate::solver::Solver;
 use crate::step::drive::{ActiveGrab, GRAB_OVER_S_MAX};
 use cut::Sphere;
@@ -230,7 +230,28 @@ impl Solver {
         value: ParameterValue,
         kind: Option<ConstraintKind>,
     ) -> Result<(), Reason> {
-        let affected = self.parameters.set(name, value, kind, self.context())?;
+        self.set_for(name, value, kind.map_or(Target::All, Target::Kind))
+    }
+
+    /// Sets `bending` for the bends of a generated block, from the next step on, as [`Self::set`] does for all.
+    ///
+    /// # Errors
+    /// Same as [`Self::set`]; or there is no such block, or it has no bends.
+    pub fn set_for_block(
+        &mut self,
+        name: &str,
+        value: ParameterValue,
+        block: u32,
+    ) -> Result<(), Reason> {
+        self.set_for(name, value, Target::Block(block))
+    }
+
+    fn set_for(&mut self, name: &str, value: ParameterValue, target: Target) -> Result<(), Reason> {
+        // Taken out meanwhile, because the context borrows the rest.
+        let mut parameters = std::mem::take(&mut self.parameters);
+        let affected = parameters.set(name, value, target, self.context());
+        self.parameters = parameters;
+        let affected = affected?;
         self.due.constraints |= affected > Affected::Nothing;
         self.due.tethers |= affected == Affected::RigidPaths;
         Ok(())

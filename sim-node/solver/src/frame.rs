@@ -38,7 +38,7 @@ impl Frame {
     }
 
     /// From a pose that a client sent. In 2-D a frame must stay in the plane.
-    pub(crate) fn check(pose: &Pose, context: Context) -> Result<Self, Reason> {
+    pub(crate) fn check(pose: &Pose, context: Context<'_>) -> Result<Self, Reason> {
         check_finite(&pose.translation)?;
         check_finite(&pose.rotation)?;
         let is_near = is_near(&pose.translation) && is_near(&pose.rotation);

@@ -2,17 +2,18 @@
 
 use serde::{Deserialize, Serialize};
 use sim_types::{
-    ConstraintKind, Method, OffMeaning, Parameter, ParameterInfo, ParameterValue, ParameterValues,
-    PerKind, Reason, ValueForm,
+    BlockValue, ConstraintKind, KindFilter, Method, OffMeaning, Parameter, ParameterInfo,
+    ParameterValue, ParameterValues, PerKind, Reason, ValueForm,
 };
 
 use crate::checks::{Context, is_near};
+use crate::constraints::bends::Bend;
 use crate::scene::definition::Scene;
 use crate::scene::definition::limits::Limits;
 use crate::scene::definition::wind::Wind;
 
 /// Values that can change while a scene runs. Part of the state, and of a keyframe.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Parameters {
     pub(crate) gravity: [f32; 3],
     pub(crate) damping: f32,
@@ -33,6 +34,59 @@ pub(crate) struct Parameters {
     softness: [Option<f32>; 4],
     /// Rigidity that replaces that of every bend.
     bending: Option<f32>,
+    /// By generated block: rigidity that replaces that of its bends, also if `bending` has a value.
+    block_bending: Vec<Option<f32>>,
+}
+
+impl Clone for Parameters {
+    fn clone(&self) -> Self {
+        Self { block_bending: self.block_bending.clone(), ..*self }
+    }
+
+    /// Allocates nothing if both belong to the same scene.
+    fn clone_from(&mut self, source: &Self) {
+        let mut block_bending = std::mem::take(&mut self.block_bending);
+        block_bending.clone_from(&source.block_bending);
+        *self = Self { block_bending, ..*source };
+    }
+}
+
+/// The constraints or bends that a setting is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Target {
+    /// All.
+    All,
+    /// The constraints of a kind.
+    Kind(ConstraintKind),
+    /// The bends of a generated block.
+    Block(u32),
+}
+
+impl Target {
+    /// The target of a command.
+    pub(crate) fn new(kind: Option<KindFilter>, block: Option<u32>) -> Result<Self, Reason> {
+        match (kind, block) {
+            (None, None) => Ok(Self::All),
+            (None, Some(block)) => Ok(Self::Block(block)),
+            (Some(KindFilter::Known(kind)), None) => Ok(Self::Kind(kind)),
+            (Some(_), _) => Err(Reason::OutOfRange),
+        }
+    }
+
+    /// Checks that a setting of this parameter can be for this target.
+    fn check(self, parameter: Parameter, context: Context<'_>) -> Result<(), Reason> {
+        let info = parameter.info();
+        match self {
+            Self::Kind(_) if !info.is_per_kind => Err(Reason::OutOfRange),
+            Self::Block(_) if parameter != Parameter::Bending => Err(Reason::OutOfRange),
+            Self::Block(block) => match context.bent_blocks.get(block as usize) {
+                Some(true) => Ok(()),
+                Some(false) => Err(Reason::NoEffectHere),
+                None => Err(Reason::OutOfRange),
+            },
+            Self::All | Self::Kind(_) => Ok(()),
+        }
+    }
 }
 
 /// Derived state that a parameter affects, from nothing to everything.
@@ -71,6 +125,7 @@ impl Parameters {
             tear_force: limits.tear_force,
             softness: [None; 4],
             bending: None,
+            block_bending: vec![None; scene.generators.len()],
         }
     }
 
@@ -85,9 +140,10 @@ impl Parameters {
         self.softness[kind as usize].unwrap_or(own)
     }
 
-    /// Rigidity of a bend, where `own` is its rigidity in the scene.
-    pub(crate) fn rigidity(&self, own: f32) -> f32 {
-        self.bending.unwrap_or(own)
+    /// Rigidity of a bend.
+    pub(crate) fn rigidity(&self, bend: &Bend) -> f32 {
+        let of_block = bend.block.and_then(|block| self.block_bending[block as usize]);
+        of_block.or(self.bending).unwrap_or(bend.rigidity)
     }
 
     /// Sets one parameter. A wrong value changes nothing.
@@ -95,29 +151,22 @@ impl Parameters {
         &mut self,
         name: &str,
         value: ParameterValue,
-        kind: Option<ConstraintKind>,
-        context: Context,
+        target: Target,
+        context: Context<'_>,
     ) -> Result<Affected, Reason> {
         let parameter = Parameter::from_name(name).ok_or(Reason::UnknownParameter)?;
         let info = parameter.info();
         check_finite(value)?;
-        if kind.is_some() && !info.is_per_kind {
-            return Err(Reason::OutOfRange);
-        }
         if info.is_per_kind && parameter != softness_parameter(context.method) {
             return Err(Reason::NoEffectHere);
         }
         if parameter == Parameter::Bending && !context.has_bends {
             return Err(Reason::NoEffectHere);
         }
+        target.check(parameter, context)?;
         check_value(info, value, context)?;
-        let mut changed = *self;
-        changed.store(parameter, value, kind);
-        let is_pass_count = matches!(parameter, Parameter::Substeps | Parameter::Iterations);
-        if is_pass_count && !context.size.allows(changed.substeps, changed.iterations) {
-            return Err(Reason::OutOfRange);
-        }
-        *self = changed;
+        self.check_pass_count(parameter, value, context)?;
+        self.store(parameter, value, target);
         Ok(match parameter {
             Parameter::Compliance | Parameter::Stiffness => Affected::RigidPaths,
             Parameter::Gravity
@@ -143,9 +192,7 @@ impl Parameters {
     pub(crate) fn affected_since(&self, before: &Self) -> Affected {
         if self.softness_bits() != before.softness_bits() {
             Affected::RigidPaths
-        } else if self.pass_bits() != before.pass_bits()
-            || self.bending.map(f32::to_bits) != before.bending.map(f32::to_bits)
-        {
+        } else if self.pass_bits() != before.pass_bits() || !self.has_bending_of(before) {
             Affected::Constraints
         } else if self.limit_bits() != before.limit_bits() {
             Affected::Limits
@@ -157,6 +204,13 @@ impl Parameters {
     /// Returns true if the same constraints are rigid as with `other`.
     pub(crate) fn has_softness_of(&self, other: &Self) -> bool {
         self.softness_bits() == other.softness_bits()
+    }
+
+    /// Returns true if every bend has the same rigidity as with `other`.
+    fn has_bending_of(&self, other: &Self) -> bool {
+        let bits = |rigidity: &Option<f32>| rigidity.map(f32::to_bits);
+        bits(&self.bending) == bits(&other.bending)
+            && self.block_bending.iter().map(bits).eq(other.block_bending.iter().map(bits))
     }
 
     fn softness_bits(&self) -> [Option<u32>; 4] {
@@ -174,8 +228,24 @@ impl Parameters {
         [max_stretch, tear_stretch, tear_distance, tear_force].map(|one| one.map(f32::to_bits))
     }
 
+    /// Checks that a number of passes keeps the work of a step within its limit.
+    fn check_pass_count(
+        &self,
+        parameter: Parameter,
+        value: ParameterValue,
+        context: Context<'_>,
+    ) -> Result<(), Reason> {
+        let ParameterValue::Number(number) = value else { return Ok(()) };
+        let (substeps, iterations) = match parameter {
+            Parameter::Substeps => (to_count(number), self.iterations),
+            Parameter::Iterations => (self.substeps, to_count(number)),
+            _ => return Ok(()),
+        };
+        if context.size.allows(substeps, iterations) { Ok(()) } else { Err(Reason::OutOfRange) }
+    }
+
     /// Stores a checked value.
-    fn store(&mut self, parameter: Parameter, value: ParameterValue, kind: Option<ConstraintKind>) {
+    fn store(&mut self, parameter: Parameter, value: ParameterValue, target: Target) {
         let number = match value {
             ParameterValue::Number(number) => Some(number),
             ParameterValue::Vector(_) | ParameterValue::Off => None,
@@ -200,11 +270,17 @@ impl Parameters {
             Parameter::TearStretch => self.tear_stretch = number,
             Parameter::TearDistance => self.tear_distance = number,
             Parameter::TearForce => self.tear_force = number,
-            Parameter::Compliance | Parameter::Stiffness => match kind {
-                Some(kind) => self.softness[kind as usize] = number,
-                None => self.softness = [number; 4],
+            Parameter::Compliance | Parameter::Stiffness => match target {
+                Target::Kind(kind) => self.softness[kind as usize] = number,
+                Target::All | Target::Block(_) => self.softness = [number; 4],
             },
-            Parameter::Bending => self.bending = number,
+            Parameter::Bending => match target {
+                Target::Block(block) => self.block_bending[block as usize] = number,
+                Target::All | Target::Kind(_) => {
+                    self.bending = number;
+                    self.block_bending.fill(None);
+                }
+            },
             // The pace belongs to the node. It is checked here, so that every program refuses the
             // same values.
             Parameter::TimeScale => {}
@@ -238,11 +314,15 @@ impl Parameters {
             compliance,
             stiffness,
             bending: self.bending,
+            bending_by_block: (0..)
+                .zip(&self.block_bending)
+                .filter_map(|(block, value)| Some(BlockValue { block, value: (*value)? }))
+                .collect(),
         }
     }
 
     /// Returns `true` if a scene of this method and dimension can have these values.
-    pub(crate) fn is_valid(&self, context: Context) -> bool {
+    pub(crate) fn is_valid(&self, context: Context<'_>) -> bool {
         let softness = softness_parameter(context.method);
         let are_valid = self.values(context.method).settings().iter().all(|setting| {
             let info = setting.parameter.info();
@@ -253,7 +333,13 @@ impl Parameters {
                 || (check_finite(setting.value).is_ok()
                     && check_value(info, setting.value, context).is_ok())
         });
-        are_valid && context.size.allows(self.substeps, self.iterations)
+        let are_blocks_valid = self.block_bending.len() == context.bent_blocks.len()
+            && self
+                .block_bending
+                .iter()
+                .zip(context.bent_blocks)
+                .all(|(rigidity, is_bent)| rigidity.is_none() || *is_bent);
+        are_valid && are_blocks_valid && context.size.allows(self.substeps, self.iterations)
     }
 }
 
@@ -278,7 +364,7 @@ fn check_finite(value: ParameterValue) -> Result<(), Reason> {
 fn check_value(
     info: &ParameterInfo,
     value: ParameterValue,
-    context: Context,
+    context: Context<'_>,
 ) -> Result<(), Reason> {
     let is_allowed = match (info.form, value) {
         (_, ParameterValue::Off) => {

@@ -128,7 +128,7 @@ impl Solver {
             air: Air::new(scene.wind, settings.rate_hz),
             is_planar: scene.dimensions == 2,
             settings,
-            parameters,
+            parameters: parameters.clone(),
             initial_parameters: parameters,
             particles,
             // Room for every particle, so that a grab does not allocate.
@@ -180,7 +180,7 @@ impl Solver {
     /// loaded, nothing grabbed, nothing torn.
     pub fn reset(&mut self) {
         self.particles = new_particles(&self.model, &self.scene_anchors);
-        self.parameters = self.initial_parameters;
+        self.parameters.clone_from(&self.initial_parameters);
         self.torn.clear();
         self.grabs.clear();
         self.anchors.reset();
@@ -310,14 +310,19 @@ impl Solver {
     }
 
     /// Properties against which parameters and poses are checked.
-    pub(crate) fn context(&self) -> Context {
+    pub(crate) fn context(&self) -> Context<'_> {
         let size = StepSize {
             particles: self.particle_count() as u64,
             constraints: (self.constraint_count() + self.bend_count()) as u64,
             colliders: self.collider_count() as u64,
         };
-        let has_bends = self.bend_count() > 0;
-        Context { method: self.settings.method, is_planar: self.is_planar, has_bends, size }
+        Context {
+            method: self.settings.method,
+            is_planar: self.is_planar,
+            has_bends: self.bend_count() > 0,
+            bent_blocks: &self.model.bent_blocks,
+            size,
+        }
     }
 
     /// Number of steps that a grab of `over_s` seconds takes, rounded up, at least one. A time that
@@ -398,6 +403,11 @@ impl Solver {
     /// Returns the number of bends.
     pub fn bend_count(&self) -> usize {
         self.model.bends.len()
+    }
+
+    /// Returns the number of generated blocks.
+    pub fn block_count(&self) -> usize {
+        self.model.bent_blocks.len()
     }
 
     /// Returns the bends by index, as loaded. Bends have indices of their own, and never tear.

@@ -21,7 +21,12 @@ fn solver(text: &str) -> Solver {
 
 fn set(parameter: Parameter, value: f32) -> Action {
     let value = ParameterValue::Number(value);
-    Action::Set { parameter: Text::cut(parameter.name()), value, constraint_kind: None }
+    Action::Set {
+        parameter: Text::cut(parameter.name()),
+        value,
+        constraint_kind: None,
+        block: None,
+    }
 }
 
 /// A state to return to.
@@ -99,6 +104,7 @@ fn prepared_constraints_change_no_bit() {
             parameter: Text::cut("compliance"),
             value: ParameterValue::Off,
             constraint_kind: Some(KindFilter::Known(sim_solver::ConstraintKind::Shear)),
+            block: None,
         },
         set(Parameter::TearStretch, 1.1),
         set(Parameter::MaxStretch, 1.2),
@@ -245,6 +251,7 @@ fn nothing_is_planned_for_commands_that_are_cheap_or_wrong() {
         parameter: Text::cut(name),
         value: ParameterValue::Number(value),
         constraint_kind: None,
+        block: None,
     };
     assert!(solver.plan([action("compliance", 1e-3)]).is_some());
     for action in [

@@ -281,7 +281,8 @@ pub(crate) struct PoseArgs {
         sim-node ctl set damping 0.5\n  \
         sim-node ctl set gravity 0 -1.6 0\n  \
         sim-node ctl set tear_stretch off\n  \
-        sim-node ctl set compliance 1e-4 --kind bend"
+        sim-node ctl set compliance 1e-4 --kind bend\n  \
+        sim-node ctl set bending 1e-3 --block 1"
 )]
 pub(crate) struct SetArgs {
     #[arg(help = parameters_help(), value_parser = parameter_name)]
@@ -292,6 +293,9 @@ pub(crate) struct SetArgs {
     /// Kind of constraints that receive the compliance or stiffness [default: all kinds]
     #[arg(long, value_name = "KIND", value_parser = constraint_kind())]
     pub(crate) kind: Option<ConstraintKind>,
+    /// Generated block of the scene whose bends receive the bending, counted from 0 [default: all bends]
+    #[arg(long, value_name = "N", value_parser = index)]
+    pub(crate) block: Option<u32>,
 }
 
 /// Parser of the name of a kind; the help lists the names.

@@ -106,6 +106,7 @@ impl Measurement {
             parameter: Text::cut("time_scale"),
             value: ParameterValue::Number(1.0),
             constraint_kind: None,
+            block: None,
         };
         print(READY)?;
         while !self.has_ended() {

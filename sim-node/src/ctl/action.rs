@@ -7,7 +7,7 @@ use anyhow::Context;
 use sim_contract::clock::SECOND_NS;
 use sim_contract::{Action, KindFilter, Text};
 
-use crate::args::{CommandVerb, PoseArgs, RewindArgs};
+use crate::args::{CommandVerb, PoseArgs, RewindArgs, SetArgs};
 use crate::scene_source;
 
 /// Action of a command. `rate_hz` returns the rate of the node.
@@ -66,11 +66,7 @@ pub(super) fn from_verb(
                 torque: numbers(&args.torque)?,
             }
         }
-        CommandVerb::Set(args) => Action::Set {
-            parameter: text(&args.parameter)?,
-            value: args.value().map_err(anyhow::Error::msg)?,
-            constraint_kind: args.kind.map(KindFilter::Known),
-        },
+        CommandVerb::Set(args) => setting(args)?,
         CommandVerb::Load { scene } => Action::Load { scene: scene_text(scene)? },
         CommandVerb::Pause => Action::Pause,
         CommandVerb::Resume => Action::Resume,
@@ -120,6 +116,15 @@ fn text(text: &str) -> anyhow::Result<Text> {
     Text::new(text).with_context(|| format!("'{text}' does not fit into a command"))
 }
 
+fn setting(args: &SetArgs) -> anyhow::Result<Action> {
+    Ok(Action::Set {
+        parameter: text(&args.parameter)?,
+        value: args.value().map_err(anyhow::Error::msg)?,
+        constraint_kind: args.kind.map(KindFilter::Known),
+        block: args.block,
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use sim_contract::{ConstraintKind, ParameterValue};
@@ -137,7 +142,7 @@ mod tests {
 
     fn set(name: &str, value: ParameterValue, kind: Option<ConstraintKind>) -> Action {
         let constraint_kind = kind.map(KindFilter::Known);
-        Action::Set { parameter: Text::cut(name), value, constraint_kind }
+        Action::Set { parameter: Text::cut(name), value, constraint_kind, block: None }
     }
 
     #[test]

@@ -49,7 +49,7 @@ fn to_f32(value: f64) -> f32 {
     value as f32
 }
 
-/// Name, kind of constraints, value and unit.
+/// Name, kind of constraints or block, value and unit.
 fn cells(setting: &Setting) -> [String; 4] {
     let info = setting.parameter.info();
     let value = match (setting.value, info.off) {
@@ -59,8 +59,12 @@ fn cells(setting: &Setting) -> [String; 4] {
         (ParameterValue::Off, _) => "off".to_owned(),
     };
     let unit = if matches!(setting.value, ParameterValue::Off) { "" } else { info.unit };
-    let kind = setting.constraint_kind.map_or("", |kind| kind.name());
-    [info.name.to_owned(), kind.to_owned(), value, unit.to_owned()]
+    let part = match (setting.constraint_kind, setting.block) {
+        (Some(kind), _) => kind.name().to_owned(),
+        (None, Some(block)) => format!("block {block}"),
+        (None, None) => String::new(),
+    };
+    [info.name.to_owned(), part, value, unit.to_owned()]
 }
 
 #[cfg(test)]
@@ -72,7 +76,7 @@ mod tests {
     #[test]
     fn values_are_shown_as_ctl_set_accepts_them() {
         let cells = |parameter, constraint_kind, value| {
-            cells(&Setting { parameter, constraint_kind, value }).join("|")
+            cells(&Setting { parameter, constraint_kind, block: None, value }).join("|")
         };
         let gravity = ParameterValue::Vector([0.0, -9.81, 0.0]);
         assert_eq!(cells(Parameter::Gravity, None, gravity), "gravity||0 -9.81 0|m/s²");
@@ -82,5 +86,8 @@ mod tests {
         assert_eq!(cells(Parameter::Compliance, shear, number), "compliance|shear|0.0001|m/N");
         let off = ParameterValue::Off;
         assert_eq!(cells(Parameter::Compliance, shear, off), "compliance|shear|as loaded|");
+        let parameter = Parameter::Bending;
+        let of_block = Setting { parameter, constraint_kind: None, block: Some(1), value: number };
+        assert_eq!(super::cells(&of_block).join("|"), "bending|block 1|0.0001|N m");
     }
 }

@@ -104,7 +104,8 @@ impl Publisher {
     ) -> anyhow::Result<Self> {
         let run_id = getrandom::u64().context("no random number for the run")?;
         let parameters = parameter_values(solver, 1.0);
-        let place = LoadPlace { run_id, step: 0, topology_revision: 0, parameters };
+        let place =
+            LoadPlace { run_id, step: 0, topology_revision: 0, parameters: parameters.clone() };
         let messages = LoadMessages::new(scene, solver);
         let owner = Owner::create(endpoint, &messages.at(place))?;
         Ok(Self {
@@ -329,7 +330,7 @@ impl Publisher {
         if values == self.parameters {
             return Ok(());
         }
-        self.parameters = values;
+        self.parameters = values.clone();
         Ok(self.owner.publish_parameters(self.run_id, step, &values)?)
     }
 

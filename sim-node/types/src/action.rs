@@ -145,6 +145,9 @@ pub enum Action {
         /// Kind of the affected constraints, for `compliance` and `stiffness`. `None` means all kinds.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         constraint_kind: Option<KindFilter>,
+        /// Index of the generated block of the affected bends, for `bending`. `None` means all bends.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        block: Option<u32>,
     },
     /// Replaces the scene.
     Load {
@@ -283,6 +286,7 @@ impl Action {
             parameter: Text::cut(name),
             value,
             constraint_kind,
+            block: None,
         };
         let structural = KindFilter::Known(ConstraintKind::Structural);
         vec![
@@ -308,6 +312,12 @@ impl Action {
             set("tear_force", ParameterValue::Off, None),
             set("compliance", ParameterValue::Number(0.0), Some(structural)),
             set("stiffness", ParameterValue::Number(1.0), Some(KindFilter::Unknown)),
+            Self::Set {
+                parameter: Text::cut("bending"),
+                value: ParameterValue::Number(1e-3),
+                constraint_kind: None,
+                block: Some(1),
+            },
             Self::Load { scene: Text::cut("./gemütlich.toml") },
             Self::Rewind { to_step: Some(0x0123_4567_89ab), back_steps: None },
             Self::Rewind { to_step: None, back_steps: Some(480) },
@@ -356,7 +366,7 @@ mod tests {
     }
 
     fn set(name: &str, value: ParameterValue, constraint_kind: Option<KindFilter>) -> Action {
-        Action::Set { parameter: Text::cut(name), value, constraint_kind }
+        Action::Set { parameter: Text::cut(name), value, constraint_kind, block: None }
     }
 
     fn read(text: &str) -> Action {

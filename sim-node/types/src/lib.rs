@@ -38,7 +38,7 @@ pub use json::non_finite::PlainF32;
 pub use limits::{CLIENT_ID_END, COLLIDERS_MAX, ELEMENTS_MAX, SCENE_SIZE_BYTES_MAX, STEP_WORK_MAX};
 pub use method::Method;
 pub use parameter::{OffMeaning, PARAMETERS, Parameter, ParameterInfo, ParameterValue, ValueForm};
-pub use parameter_values::{ParameterValues, PerKind, SETTINGS_COUNT, Setting};
+pub use parameter_values::{BlockValue, ParameterValues, PerKind, SETTINGS_COUNT, Setting};
 pub use particle_flags::ParticleFlags;
 pub use range::{COORDINATE_MAX, NumberRange};
 pub use reason::Reason;

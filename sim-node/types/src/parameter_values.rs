@@ -6,23 +6,26 @@ use crate::constraint_kind::ConstraintKind;
 use crate::json::non_finite::{number, optional_number, vector};
 use crate::parameter::{Parameter, ParameterValue};
 
-/// A parameter with a value. `compliance` and `stiffness` have a value for each kind of constraint.
+/// A parameter with a value. `compliance` and `stiffness` have a value for each kind of constraint, and
+/// `bending` can have one for each generated block.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Setting {
     /// The parameter.
     pub parameter: Parameter,
     /// Kind of constraint, for a parameter with a value for each kind.
     pub constraint_kind: Option<ConstraintKind>,
+    /// Index of the generated block, for the `bending` of one block.
+    pub block: Option<u32>,
     /// The value.
     pub value: ParameterValue,
 }
 
-/// Number of [`Setting`]s in [`ParameterValues`]: 16 parameters have one value, and two have a value
-/// for each of the four kinds of constraints.
+/// Number of [`Setting`]s in [`ParameterValues`], besides one for each block with a `bending` of its own:
+/// 16 parameters have one value, and two have a value for each of the four kinds of constraints.
 pub const SETTINGS_COUNT: usize = 24;
 
 /// The values of all parameters, named as in commands. `None` means off.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[allow(missing_docs, reason = "described in the table of parameters")]
 pub struct ParameterValues {
     #[serde(with = "vector")]
@@ -58,6 +61,19 @@ pub struct ParameterValues {
     /// Older recordings lack it.
     #[serde(default, with = "optional_number")]
     pub bending: Option<f32>,
+    /// Blocks with another `bending`, ascending. Older recordings lack it.
+    #[serde(default)]
+    pub bending_by_block: Vec<BlockValue>,
+}
+
+/// A value for one generated block.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct BlockValue {
+    /// Index of the block among the scene's `[[generate]]` blocks.
+    pub block: u32,
+    /// The value.
+    #[serde(with = "number")]
+    pub value: f32,
 }
 
 /// In recordings from before there were contacts.
@@ -133,29 +149,31 @@ impl ParameterValues {
         contact: None,
         contact_friction: 0.3,
         bending: None,
+        bending_by_block: Vec::new(),
     };
 
-    /// Returns all values, by parameter and then by kind.
-    pub fn settings(&self) -> [Setting; SETTINGS_COUNT] {
-        let mut settings = [Setting {
-            parameter: Parameter::Gravity,
-            constraint_kind: None,
-            value: ParameterValue::Off,
-        }; SETTINGS_COUNT];
+    /// Returns all values, by parameter and then by kind, and then those of blocks.
+    pub fn settings(&self) -> Vec<Setting> {
         let keys = Parameter::ALL.into_iter().flat_map(|parameter| {
             let kinds: &[Option<ConstraintKind>] =
                 if parameter.info().is_per_kind { &KINDS } else { &[None] };
             kinds.iter().map(move |kind| (parameter, *kind))
         });
-        for (setting, (parameter, constraint_kind)) in settings.iter_mut().zip(keys) {
+        let of_all = keys.map(|(parameter, constraint_kind)| {
             let value = self.get(parameter, constraint_kind);
-            *setting = Setting { parameter, constraint_kind, value };
-        }
-        settings
+            Setting { parameter, constraint_kind, block: None, value }
+        });
+        let of_blocks = self.bending_by_block.iter().map(|one| Setting {
+            parameter: Parameter::Bending,
+            constraint_kind: None,
+            block: Some(one.block),
+            value: ParameterValue::Number(one.value),
+        });
+        of_all.chain(of_blocks).collect()
     }
 
-    /// Returns the value of a parameter. `kind` selects the value of a parameter with a value for each
-    /// kind; without it, such a parameter is off.
+    /// Returns the value of a parameter; the `bending` of blocks without one of their own. `kind` selects
+    /// the value of a parameter with a value for each kind; without it, such a parameter is off.
     pub fn get(&self, parameter: Parameter, kind: Option<ConstraintKind>) -> ParameterValue {
         use ParameterValue::{Number, Vector};
         let optional = |value: Option<f32>| value.map_or(ParameterValue::Off, Number);
@@ -183,9 +201,9 @@ impl ParameterValues {
 
     /// Stores a value without checks, because the node has checked the values that it publishes. For a
     /// parameter that cannot be off, off means 0. A number does not change a vector, and a vector means
-    /// off for a number.
+    /// off for a number. A `bending` without a block replaces those of all blocks.
     pub fn set(&mut self, setting: Setting) {
-        let Setting { parameter, constraint_kind, value } = setting;
+        let Setting { parameter, constraint_kind, block, value } = setting;
         let (number, vector) = match value {
             ParameterValue::Number(number) => (Some(number), None),
             ParameterValue::Vector(vector) => (None, Some(vector)),
@@ -210,7 +228,14 @@ impl ParameterValues {
             Parameter::Stiffness => set_kinds(&mut self.stiffness, constraint_kind, number),
             Parameter::Contact => self.contact = number,
             Parameter::ContactFriction => self.contact_friction = or_zero,
-            Parameter::Bending => self.bending = number,
+            Parameter::Bending => {
+                if let Some(block) = block {
+                    set_block(&mut self.bending_by_block, block, number);
+                } else {
+                    self.bending = number;
+                    self.bending_by_block.clear();
+                }
+            }
         }
     }
 }
@@ -227,6 +252,16 @@ fn set_kinds(values: &mut PerKind, kind: Option<ConstraintKind>, value: Option<f
     match kind {
         Some(kind) => values.set(kind, value),
         None => ConstraintKind::ALL.into_iter().for_each(|kind| values.set(kind, value)),
+    }
+}
+
+/// Sets or removes the value of a block. The blocks stay in ascending order.
+fn set_block(values: &mut Vec<BlockValue>, block: u32, value: Option<f32>) {
+    match (values.binary_search_by_key(&block, |one| one.block), value) {
+        (Ok(place), Some(value)) => values[place].value = value,
+        (Ok(place), None) => _ = values.remove(place),
+        (Err(place), Some(value)) => values.insert(place, BlockValue { block, value }),
+        (Err(_), None) => {}
     }
 }
 
@@ -265,9 +300,15 @@ mod tests {
                 ValueForm::Number | ValueForm::Whole => ParameterValue::Number(7.0),
             };
             let constraint_kind = info.is_per_kind.then_some(ConstraintKind::Bend);
-            values.set(Setting { parameter: info.parameter, constraint_kind, value });
+            values.set(Setting { parameter: info.parameter, constraint_kind, block: None, value });
             assert_eq!(values.get(info.parameter, constraint_kind), value, "{}", info.name);
         }
+        for (block, value) in [(7, 0.5), (2, 0.25), (7, 0.125), (3, 1.0)] {
+            values.set(bending_of(block, ParameterValue::Number(value)));
+        }
+        values.set(bending_of(3, ParameterValue::Off));
+        let blocks: Vec<_> = values.bending_by_block.iter().map(|b| (b.block, b.value)).collect();
+        assert_eq!(blocks, [(2, 0.25), (7, 0.125)]);
         let mut copy = ParameterValues::default();
         for setting in values.settings() {
             copy.set(setting);
@@ -285,6 +326,7 @@ mod tests {
             values.set(Setting {
                 parameter: info.parameter,
                 constraint_kind: None,
+                block: None,
                 value: ParameterValue::Off,
             });
         }
@@ -295,7 +337,8 @@ mod tests {
     fn a_softness_without_a_kind_applies_to_all_kinds() {
         let mut values = ParameterValues::default();
         let value = ParameterValue::Number(1e-3);
-        values.set(Setting { parameter: Parameter::Compliance, constraint_kind: None, value });
+        let parameter = Parameter::Compliance;
+        values.set(Setting { parameter, constraint_kind: None, block: None, value });
         assert!(ConstraintKind::ALL.iter().all(|kind| values.compliance.get(*kind) == Some(1e-3)));
     }
 
@@ -304,6 +347,23 @@ mod tests {
         let json = serde_json::to_value(ParameterValues::default()).unwrap();
         let names: Vec<_> = PARAMETERS.iter().map(|info| info.name).collect();
         assert!(names.iter().all(|name| json.get(name).is_some()));
-        assert_eq!(json.as_object().unwrap().len(), names.len());
+        assert_eq!(json.as_object().unwrap().len(), names.len() + 1, "and bending_by_block");
+    }
+
+    fn bending_of(block: u32, value: ParameterValue) -> Setting {
+        let parameter = Parameter::Bending;
+        Setting { parameter, constraint_kind: None, block: Some(block), value }
+    }
+
+    #[test]
+    fn a_bending_without_a_block_replaces_those_of_all_blocks() {
+        let mut values = ParameterValues::default();
+        values.set(bending_of(1, ParameterValue::Number(0.5)));
+        assert_eq!(values.settings().len(), SETTINGS_COUNT + 1);
+        let value = ParameterValue::Number(0.25);
+        let parameter = Parameter::Bending;
+        values.set(Setting { parameter, constraint_kind: None, block: None, value });
+        assert_eq!((values.bending, &values.bending_by_block[..]), (Some(0.25), &[][..]));
+        assert_eq!(values.settings().len(), SETTINGS_COUNT);
     }
 }

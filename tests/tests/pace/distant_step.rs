@@ -32,6 +32,7 @@ fn a_new_time_scale_moves_the_step_that_the_node_waits_for() {
         parameter: Text::new("time_scale").unwrap(),
         value: ParameterValue::Number(1000.0),
         constraint_kind: None,
+        block: None,
     };
     let step = client.request(action, DEADLINE).unwrap().step;
     loop {

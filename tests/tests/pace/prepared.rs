@@ -14,7 +14,12 @@ fn large_scene(sandbox: &Sandbox, columns: u32) -> String {
 
 fn set_compliance(value: f32) -> Action {
     let value = ParameterValue::Number(value);
-    Action::Set { parameter: Text::new("compliance").unwrap(), value, constraint_kind: None }
+    Action::Set {
+        parameter: Text::new("compliance").unwrap(),
+        value,
+        constraint_kind: None,
+        block: None,
+    }
 }
 
 #[test]

@@ -1,7 +1,8 @@
 //! Parameters in Foxglove's form: a name and a plain value.
 //!
 //! A parameter that is off has the value "off", because clients never see a parameter without a value.
-//! A softness has one name for all constraints and one for each kind.
+//! A softness has one name for all constraints and one for each kind. `bending` has one name for all bends, and
+//! `bending.1` is that of the bends of the generated block 1.
 
 use foxglove::websocket::{
     Parameter as NamedValue, ParameterType, ParameterValue as FoxgloveValue,
@@ -23,11 +24,19 @@ pub(super) fn list(values: &ParameterValues) -> Vec<NamedValue> {
     Parameter::ALL.into_iter().flat_map(|parameter| named_values(parameter, values)).collect()
 }
 
-/// Lists the values of one parameter: one, or one for all kinds of constraints and one for each.
+/// Lists the values of one parameter: one, or one for all kinds of constraints and one for each; of `bending`,
+/// one for all bends, and one for each block with another value.
 fn named_values(parameter: Parameter, values: &ParameterValues) -> Vec<NamedValue> {
     let info = parameter.info();
     if !info.is_per_kind {
-        return vec![named(info.name, info, values.get(parameter, None))];
+        let mut list = vec![named(info.name, info, values.get(parameter, None))];
+        if parameter == Parameter::Bending {
+            list.extend(values.bending_by_block.iter().map(|one| {
+                let name = format!("{}.{}", info.name, one.block);
+                named(&name, info, ParameterValue::Number(one.value))
+            }));
+        }
+        return list;
     }
     let each = ConstraintKind::ALL.map(|kind| values.get(parameter, Some(kind)));
     let is_same = each.iter().all(|value| *value == each[0]);
@@ -70,15 +79,20 @@ fn same_decimals(value: f32) -> f64 {
 
 /// Creates the command that sets a parameter.
 pub(super) fn command(named: &NamedValue) -> Result<Command, Reason> {
-    let (name, kind) = match named.name.split_once('.') {
+    let (name, part) = match named.name.split_once('.') {
         None => (named.name.as_str(), None),
-        Some((name, kind)) => (name, Some(kind)),
+        Some((name, part)) => (name, Some(part)),
     };
     let info = Parameter::from_name(name).ok_or(Reason::UnknownParameter)?.info();
-    let constraint_kind = match kind.map(KindFilter::from_name) {
-        None => None,
-        Some(known @ KindFilter::Known(_)) if info.is_per_kind => Some(known),
-        Some(_) => return Err(Reason::UnknownParameter),
+    let (constraint_kind, block) = match part {
+        None => (None, None),
+        Some(block) if info.parameter == Parameter::Bending => {
+            (None, Some(block.parse().map_err(|_| Reason::UnknownParameter)?))
+        }
+        Some(kind) => match KindFilter::from_name(kind) {
+            known @ KindFilter::Known(_) if info.is_per_kind => (Some(known), None),
+            _ => return Err(Reason::UnknownParameter),
+        },
     };
     let can_be_off =
         matches!(info.off, OffMeaning::Zero | OffMeaning::NoLimit | OffMeaning::Absent);
@@ -93,7 +107,7 @@ pub(super) fn command(named: &NamedValue) -> Result<Command, Reason> {
         }
         _ => return Err(Reason::OutOfRange),
     };
-    Ok(Command::Set { parameter: name.to_owned(), value, constraint_kind })
+    Ok(Command::Set { parameter: name.to_owned(), value, constraint_kind, block })
 }
 
 #[allow(clippy::cast_possible_truncation, reason = "the value is rounded once, here")]
@@ -107,6 +121,8 @@ fn number(value: &FoxgloveValue) -> Result<f32, Reason> {
 
 #[cfg(test)]
 mod tests {
+    use sim_contract::BlockValue;
+
     use super::*;
 
     fn value_of(name: &str, values: &ParameterValues) -> FoxgloveValue {
@@ -143,6 +159,9 @@ mod tests {
         assert_eq!(value_of("compliance.bend", &values), FoxgloveValue::Float64(0.5));
         let own = FoxgloveValue::String(OWN_OF_EACH.to_owned());
         assert_eq!(value_of("compliance", &values), own);
+        values.bending_by_block.push(BlockValue { block: 3, value: 0.25 });
+        assert_eq!(value_of("bending", &values), own);
+        assert_eq!(value_of("bending.3", &values), FoxgloveValue::Float64(0.25));
     }
 
     #[test]
@@ -151,6 +170,7 @@ mod tests {
             parameter: parameter.to_owned(),
             value,
             constraint_kind,
+            block: None,
         };
         let axes = vec![
             FoxgloveValue::Integer(0),
@@ -167,12 +187,23 @@ mod tests {
         let value = ParameterValue::Number(0.5);
         let command = command_for("stiffness.shear", FoxgloveValue::Float64(0.5));
         assert_eq!(command, Ok(set("stiffness", value, kind)));
+        let command = command_for("bending.12", FoxgloveValue::Float64(0.5));
+        let (parameter, block) = ("bending".to_owned(), Some(12));
+        assert_eq!(command, Ok(Command::Set { parameter, value, constraint_kind: None, block }));
     }
 
     #[test]
     fn a_wrong_name_or_value_is_refused() {
         let number = || FoxgloveValue::Float64(1.0);
-        for name in ["", "dance", "damping.shear", "stiffness.silk", "stiffness."] {
+        for name in [
+            "bending.shear",
+            "bending.-1",
+            "",
+            "dance",
+            "damping.shear",
+            "stiffness.silk",
+            "stiffness.",
+        ] {
             assert_eq!(command_for(name, number()), Err(Reason::UnknownParameter), "{name}");
         }
         let word = |word: &str| FoxgloveValue::String(word.to_owned());

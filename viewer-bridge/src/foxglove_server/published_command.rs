@@ -38,8 +38,9 @@ pub fn parse(payload: &[u8], epoch: u32) -> Result<Command, String> {
         Action::MoveCollider { collider, translation, rotation } => {
             Command::MoveCollider { collider, translation, rotation }
         }
-        Action::Set { parameter, value, constraint_kind } => {
-            Command::Set { parameter: parameter.as_str().to_owned(), value, constraint_kind }
+        Action::Set { parameter, value, constraint_kind, block } => {
+            let parameter = parameter.as_str().to_owned();
+            Command::Set { parameter, value, constraint_kind, block }
         }
         Action::Load { scene } => Command::Load { scene: scene.as_str().to_owned() },
         Action::Mark { text } => Command::Mark { text: text.as_str().to_owned() },

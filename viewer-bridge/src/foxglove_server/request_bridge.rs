@@ -111,7 +111,7 @@ impl RequestBridge {
 
     /// Sets the present parameters and sends the changes to the clients that follow them.
     pub(super) fn set_parameters(&self, new: Option<ParameterValues>) {
-        let old = std::mem::replace(&mut self.state().parameters, new);
+        let old = std::mem::replace(&mut self.state().parameters, new.clone());
         let library = self.library();
         let (Some(new), Some(library)) = (new, library.as_ref()) else { return };
         let old = old.as_ref().map(parameters::list).unwrap_or_default();
@@ -270,7 +270,7 @@ impl RequestBridge {
     /// Notes the outcome of one parameter. Answers the request after the last one.
     fn close_parameter(&self, number: u32, parameter: Parameter, outcome: &OutcomeText) {
         let mut state = self.state();
-        let present = state.parameters;
+        let present = state.parameters.clone();
         let Some(request) = state.parameter_requests.get_mut(&number) else { return };
         if outcome.status == Status::Applied {
             request.values.push(parameter);

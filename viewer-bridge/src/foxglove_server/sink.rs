@@ -53,7 +53,7 @@ impl Sink for FoxgloveSink {
             Update::State(state) => self.publisher.publish_state(&state),
             Update::Status(row) => self.publisher.publish_status(row),
             Update::Outcome(row) => self.publisher.publish_outcome(row),
-            Update::Parameters(text) => self.bridge.set_parameters(text.values),
+            Update::Parameters(text) => self.bridge.set_parameters(text.values.clone()),
             Update::Node(node) if node.is_paused => self.redraw_scene(),
             Update::Playback(playback) => {
                 self.bridge.set_playback(*playback);

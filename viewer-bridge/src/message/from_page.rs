@@ -184,6 +184,8 @@ pub enum Command {
         value: ParameterValue,
         #[serde(default)]
         constraint_kind: Option<KindFilter>,
+        #[serde(default)]
+        block: Option<u32>,
     },
     Mark {
         text: String,
@@ -397,6 +399,7 @@ mod tests {
             parameter: "tear_force".to_owned(),
             value: ParameterValue::Off,
             constraint_kind: None,
+            block: None,
         };
         assert_eq!(FromPage::parse(text), Ok(FromPage::Command { id: None, command }));
         assert!(FromPage::parse(r#"{"type":"set","parameter":"tear_force"}"#).is_err());

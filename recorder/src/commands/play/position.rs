@@ -93,7 +93,7 @@ impl Position {
     pub(crate) fn apply_parameters(&mut self, message: &Message) {
         match message {
             Message::Parameters(row) => {
-                self.parameters = row.values;
+                self.parameters = row.values.clone();
                 self.has_parameters = true;
             }
             Message::Keyframe { bytes, .. } if !self.has_parameters => {

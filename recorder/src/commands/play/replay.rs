@@ -94,7 +94,7 @@ impl Replay {
             triangles: &triangles,
             collider_count: recorded.collider_count,
             keyframe_size_bytes_max: recorded.keyframe_size_bytes_max,
-            parameters: position.parameters,
+            parameters: position.parameters.clone(),
         };
         let owner = own(endpoint, owner, &load)?;
         let run = run.clone();
@@ -103,7 +103,7 @@ impl Replay {
             run,
             run_id,
             published_torn: Torn::default(),
-            published_parameters: position.parameters,
+            published_parameters: position.parameters.clone(),
             status: position.latched_status.take(),
             position,
             step: None,
@@ -249,7 +249,7 @@ impl Replay {
     /// Publishes the parameters, if they have changed.
     fn publish_parameters(&mut self, step: u64) -> anyhow::Result<()> {
         if self.published_parameters != self.position.parameters {
-            self.published_parameters = self.position.parameters;
+            self.published_parameters = self.position.parameters.clone();
             self.owner.publish_parameters(self.run_id, step, &self.published_parameters)?;
         }
         Ok(())

@@ -29,7 +29,7 @@ impl FirstState {
         ];
         // Parameters of the next step follow with its state.
         if parameters.header.step <= header.step {
-            changes.push(Change::Parameters(parameters.header, parameters.values));
+            changes.push(Change::Parameters(parameters.header, parameters.values.clone()));
         }
         changes
             .extend(state.changes.iter().filter(|change| is_keyframe_of(change, header)).cloned());

@@ -72,12 +72,9 @@ impl SizeLimits {
             // The same bounds as `Solver::keyframe_size_bytes_max`.
             Topic::Keyframe => 64 * particle_count + 16 * constraint_count + 2 * scene_size_bytes,
             Topic::Particles => 32 * particle_count,
-            Topic::Tf
-            | Topic::Parameters
-            | Topic::Outcomes
-            | Topic::Status
-            | Topic::Events
-            | Topic::Steps => 0,
+            // A generated block has at least 30 bytes in the scene, and at most 60 here.
+            Topic::Parameters => 2 * scene_size_bytes,
+            Topic::Tf | Topic::Outcomes | Topic::Status | Topic::Events | Topic::Steps => 0,
         };
         FIXED_SIZE_BYTES + growing
     }
@@ -159,7 +156,7 @@ mod tests {
             rigidity: number,
             rest: number,
             shape: 2,
-            block: index as i32,
+            block: i32::try_from(index).unwrap(),
         };
         let mut topology =
             TopologyRow::new(&LoadHeader::default(), &vec![constraint; count], &vec![bend; count]);

@@ -154,6 +154,8 @@ struct ActionSchema {
     #[schemars(skip_serializing_if = "Option::is_none")]
     constraint_kind: Option<String>,
     #[schemars(skip_serializing_if = "Option::is_none")]
+    block: Option<u32>,
+    #[schemars(skip_serializing_if = "Option::is_none")]
     scene: Option<String>,
     #[schemars(skip_serializing_if = "Option::is_none")]
     to_step: Option<u64>,

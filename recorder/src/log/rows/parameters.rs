@@ -37,6 +37,15 @@ struct ValuesSchema {
     contact: Option<f32>,
     contact_friction: f32,
     bending: Option<f32>,
+    bending_by_block: Vec<BlockValueSchema>,
+}
+
+/// The schema of a value for one generated block.
+#[derive(JsonSchema)]
+#[allow(dead_code, reason = "only its schema is used")]
+struct BlockValueSchema {
+    block: u32,
+    value: f32,
 }
 
 /// The schema of a value for each kind of constraint. `null` means that each constraint has its own.
@@ -51,6 +60,8 @@ struct PerKindSchema {
 
 #[cfg(test)]
 mod tests {
+    use sim_contract::BlockValue;
+
     use super::*;
 
     #[test]
@@ -59,6 +70,7 @@ mod tests {
             gravity: [0.1, -9.81, 1e-40],
             tear_force: Some(0.3),
             max_speed: f32::INFINITY,
+            bending_by_block: vec![BlockValue { block: 3, value: 0.1 }],
             ..ParameterValues::default()
         };
         let row = ParametersRow { step: 12, values };
@@ -69,6 +81,10 @@ mod tests {
         );
         assert!(
             text.contains(r#""tear_distance":null,"tear_force":0.3,"max_speed":"inf""#),
+            "{text}"
+        );
+        assert!(
+            text.ends_with(r#""bending":null,"bending_by_block":[{"block":3,"value":0.1}]}"#),
             "{text}"
         );
         assert_eq!(serde_json::from_str::<ParametersRow>(&text).unwrap(), row);

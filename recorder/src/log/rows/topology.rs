@@ -34,7 +34,7 @@ pub struct TopologyRow {
     /// of tearing.
     pub torn: Vec<u32>,
     /// The bends. Empty in recordings of format 5 and earlier.
-    pub bends: BendColumns,
+    pub bends: Box<BendColumns>,
 }
 
 /// The bends of a scene in columns: [`BendState`]s. They have their own indices, and never tear.
@@ -83,7 +83,7 @@ struct Columns {
     kind: Vec<u32>,
     torn: Vec<u32>,
     #[serde(default)]
-    bends: BendColumns,
+    bends: Box<BendColumns>,
 }
 
 impl TryFrom<Columns> for TopologyRow {
@@ -146,7 +146,7 @@ impl TopologyRow {
             },
             kind: constraints.iter().map(|c| c.kind).collect(),
             torn: Vec::new(),
-            bends: BendColumns::new(bends),
+            bends: Box::new(BendColumns::new(bends)),
         }
     }
 

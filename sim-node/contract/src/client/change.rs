@@ -134,7 +134,7 @@ impl PendingChanges {
     pub(crate) fn parameters(&self, run_id: u64) -> Option<Parameters> {
         self.changes(run_id).find_map(|change| match change {
             Change::Parameters(header, values) => {
-                Some(Parameters { header: *header, values: *values })
+                Some(Parameters { header: *header, values: values.clone() })
             }
             _ => None,
         })

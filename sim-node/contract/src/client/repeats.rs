@@ -36,7 +36,9 @@ impl Repeats {
             Update::Colliders(header, _) => is_same(&mut self.colliders, *header),
             Update::Tears(header, _) => is_same(&mut self.tears, *header),
             // Several messages of one step have the same header.
-            Update::Parameters(header, values) => is_same(&mut self.parameters, (*header, *values)),
+            Update::Parameters(header, values) => {
+                is_same(&mut self.parameters, (*header, values.clone()))
+            }
             Update::Forces(header, _) => is_same(&mut self.forces, *header),
             Update::Keyframe(header, _) => is_same(&mut self.keyframe, *header),
             Update::Outcome(_) | Update::Status(_) => false,

@@ -68,7 +68,11 @@ impl StateAssembler {
                 changes.push(header.run_id, header.step, Change::Tears(*header, list.to_vec()));
             }
             Update::Parameters(header, values) => {
-                changes.push(header.run_id, header.step, Change::Parameters(*header, *values));
+                changes.push(
+                    header.run_id,
+                    header.step,
+                    Change::Parameters(*header, values.clone()),
+                );
             }
             Update::Forces(header, rows) => {
                 changes.push(header.run_id, header.step, Change::Forces(*header, rows.to_vec()));
@@ -150,7 +154,7 @@ impl StateAssembler {
                 self.colliders.colliders.clone_from(list);
             }
             Change::Parameters(header, values) => {
-                self.parameters = Parameters { header: *header, values: *values };
+                self.parameters = Parameters { header: *header, values: values.clone() };
             }
             Change::Tears(header, list) => {
                 let new = self.torn.replace(*header, list);

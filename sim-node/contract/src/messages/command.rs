@@ -28,7 +28,7 @@ pub const CONSOLE_CLIENT_ID: u64 = 0;
 /// | 13 cut_segment | | from, to, direction | |
 /// | 14 move_anchor | anchor | translation | `rotation` |
 /// | 15 move_collider | collider | translation | `rotation` |
-/// | 16 set | | value, if a vector | `text` parameter, `number` value, `count` constraint kind |
+/// | 16 set | block | value, if a vector | `text` parameter, `number` value, `count` constraint kind |
 /// | 17 load | | | `text` scene |
 /// | 18 rewind | step, low 32 bits | | `count` step, high 32 bits; or [`CommandOptions::BACK`] and `count` steps |
 /// | 19 restore | hash, low 32 bits | | `count` hash, high 32 bits; [`CommandOptions::STATE`] or [`CommandOptions::MOTION`] |
@@ -40,7 +40,8 @@ pub const CONSOLE_CLIENT_ID: u64 = 0;
 pub struct Command {
     /// Number of the action in the table above.
     pub kind: u32,
-    /// Index of the particle, constraint, anchor or collider.
+    /// Index of the particle, constraint, anchor, collider or, if [`CommandOptions::BLOCK`] is set, generated
+    /// block.
     pub index: u32,
     /// Random number of the sender, below 2^53 (exact in JSON); [`CONSOLE_CLIENT_ID`] is the console.
     pub client_id: u64,
@@ -98,6 +99,8 @@ impl CommandOptions {
     pub const STATE: u32 = 1 << 8;
     /// A restore puts positions and velocities in place.
     pub const MOTION: u32 = 1 << 9;
+    /// A set addresses the bends of one generated block.
+    pub const BLOCK: u32 = 1 << 10;
 
     const VALUE_ANY: u32 = Self::VALUE_NUMBER | Self::VALUE_VECTOR | Self::VALUE_OFF;
 }
@@ -149,10 +152,10 @@ impl Command {
             Action::Move { particle, target, over_s } => {
                 Self::with_kind(kind::MOVE, particle).with_vector(target, over_s)
             }
-            Action::Release { particle, force } => Self {
-                options: if force { CommandOptions::FORCE } else { 0 },
-                ..Self::with_kind(kind::RELEASE, particle)
-            },
+            Action::Release { particle, force } => {
+                let options = if force { CommandOptions::FORCE } else { 0 };
+                Self { options, ..Self::with_kind(kind::RELEASE, particle) }
+            }
             Action::Pause => Self::with_kind(kind::PAUSE, 0),
             Action::Resume => Self::with_kind(kind::RESUME, 0),
             Action::Step { count } => Self { count, ..Self::with_kind(kind::STEP, 0) },
@@ -178,20 +181,20 @@ impl Command {
                 rotation,
                 ..Self::with_kind(kind::MOVE_COLLIDER, collider).with_vector(translation, 0.0)
             },
-            Action::Set { parameter, value, constraint_kind } => {
-                Self { text: parameter.to_wire(), ..Self::from_value(value, constraint_kind) }
+            Action::Set { parameter, value, constraint_kind, block } => {
+                Self::from_value(value).with_parameter(parameter).with_part(constraint_kind, block)
             }
             Action::Load { scene } => {
                 Self { text: scene.to_wire(), ..Self::with_kind(kind::LOAD, 0) }
             }
             Action::Rewind { to_step, back_steps } => Self::from_rewind(to_step, back_steps),
-            Action::Restore { contents, state_hash } => Self {
-                options: match contents {
+            Action::Restore { contents, state_hash } => {
+                let options = match contents {
                     RestoreContents::State => CommandOptions::STATE,
                     RestoreContents::Motion => CommandOptions::MOTION,
-                },
-                ..Self::with_kind(kind::RESTORE, 0).with_long(state_hash)
-            },
+                };
+                Self { options, ..Self::with_kind(kind::RESTORE, 0).with_long(state_hash) }
+            }
             Action::Mark { text } => {
                 Self { text: text.to_wire(), ..Self::with_kind(kind::MARK, 0) }
             }
@@ -260,9 +263,9 @@ impl Command {
         bytemuck::pod_read_unaligned(&self.text[..WRENCH_SIZE_BYTES])
     }
 
-    fn from_value(value: ParameterValue, constraint_kind: Option<KindFilter>) -> Self {
+    fn from_value(value: ParameterValue) -> Self {
         let empty = Self::with_kind(kind::SET, 0);
-        let mut command = match value {
+        match value {
             ParameterValue::Number(number) => {
                 Self { number, options: CommandOptions::VALUE_NUMBER, ..empty }
             }
@@ -270,10 +273,23 @@ impl Command {
                 Self { options: CommandOptions::VALUE_VECTOR, ..empty.with_vector(vector, 0.0) }
             }
             ParameterValue::Off => Self { options: CommandOptions::VALUE_OFF, ..empty },
-        };
-        if let Some(constraint_kind) = constraint_kind {
-            command.count = constraint_kind.number();
+        }
+    }
+
+    fn with_parameter(self, parameter: Text) -> Self {
+        Self { text: parameter.to_wire(), ..self }
+    }
+
+    /// Restricts a set to the constraints of a kind, or to the bends of a generated block.
+    fn with_part(self, constraint_kind: Option<KindFilter>, block: Option<u32>) -> Self {
+        let mut command = self;
+        if let Some(kind) = constraint_kind {
+            command.count = kind.number();
             command.options |= CommandOptions::CONSTRAINT_KIND;
+        }
+        if let Some(block) = block {
+            command.index = block;
+            command.options |= CommandOptions::BLOCK;
         }
         command
     }
@@ -367,6 +383,7 @@ impl Command {
             parameter: Text::from_wire(&self.text),
             value,
             constraint_kind: has_kind.then(|| KindFilter::from_number(self.count)),
+            block: self.has(CommandOptions::BLOCK).then_some(self.index),
         }
     }
 
@@ -420,7 +437,8 @@ mod tests {
     #[test]
     fn a_set_without_a_value_or_with_two_values_is_unknown() {
         let value = ParameterValue::Number(1.0);
-        let action = Action::Set { parameter: Text::cut("damping"), value, constraint_kind: None };
+        let parameter = Text::cut("damping");
+        let action = Action::Set { parameter, value, constraint_kind: None, block: None };
         let valid = Command::new(0, 0, action);
         for options in [0, CommandOptions::VALUE_NUMBER | CommandOptions::VALUE_OFF] {
             let command = Command { options, ..valid };
@@ -432,7 +450,8 @@ mod tests {
     fn a_constraint_kind_of_another_version_is_unknown() {
         let value = ParameterValue::Number(1.0);
         let constraint_kind = Some(KindFilter::Unknown);
-        let action = Action::Set { parameter: Text::cut("compliance"), value, constraint_kind };
+        let parameter = Text::cut("compliance");
+        let action = Action::Set { parameter, value, constraint_kind, block: None };
         let command = Command { count: 4, ..Command::new(0, 0, action) };
         assert_eq!(command.action(), action);
     }

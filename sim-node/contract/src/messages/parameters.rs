@@ -21,8 +21,9 @@ pub struct ParametersHeader {
 
 const _: () = assert!(size_of::<ParametersHeader>() == 24 && align_of::<ParametersHeader>() == 8);
 
-/// The value of one parameter: 24 bytes, alignment 4; an element of `parameters`. A parameter with a
-/// value for each kind of constraint has one element for each kind.
+/// The value of one parameter: 28 bytes, alignment 4; an element of `parameters`. A parameter with a
+/// value for each kind of constraint has one element for each kind. `bending` has one element for all bends,
+/// and after it one for each generated block with another value.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable, ZeroCopySend)]
 #[repr(C)]
 #[type_name("catenary.ParameterState")]
@@ -31,13 +32,15 @@ pub struct ParameterState {
     pub parameter: u32,
     /// A [`ConstraintKind`] as a number, for a parameter with a value for each kind; else 0.
     pub constraint_kind: u32,
+    /// Index of a generated block, for its `bending`; else -1.
+    pub block: i32,
     /// Form of the value: 0 is off, 1 a number, 2 three numbers.
     pub form: u32,
     /// The number, or the three numbers. Unused components are 0.
     pub value: [f32; 3],
 }
 
-const _: () = assert!(size_of::<ParameterState>() == 24 && align_of::<ParameterState>() == 4);
+const _: () = assert!(size_of::<ParameterState>() == 28 && align_of::<ParameterState>() == 4);
 
 impl From<Setting> for ParameterState {
     fn from(setting: Setting) -> Self {
@@ -49,6 +52,7 @@ impl From<Setting> for ParameterState {
         Self {
             parameter: setting.parameter as u32,
             constraint_kind: setting.constraint_kind.map_or(0, |kind| kind as u32),
+            block: setting.block.and_then(|block| i32::try_from(block).ok()).unwrap_or(-1),
             form,
             value,
         }
@@ -70,7 +74,11 @@ impl ParameterState {
             2 => ParameterValue::Vector(self.value),
             _ => return None,
         };
-        Some(Setting { parameter, constraint_kind, value })
+        let block = match u32::try_from(self.block) {
+            Ok(_) if parameter != Parameter::Bending => return None,
+            block => block.ok(),
+        };
+        Some(Setting { parameter, constraint_kind, block, value })
     }
 }
 
@@ -85,7 +93,7 @@ pub(crate) fn to_values(states: &[ParameterState]) -> ParameterValues {
 
 #[cfg(test)]
 mod tests {
-    use sim_types::PerKind;
+    use sim_types::{BlockValue, PerKind};
 
     use super::*;
 
@@ -97,18 +105,29 @@ mod tests {
             tear_force: Some(0.25),
             time_scale: 0.5,
             stiffness: PerKind { bend: Some(0.125), ..PerKind::default() },
+            bending: Some(1e-3),
+            bending_by_block: vec![
+                BlockValue { block: 0, value: 0.0 },
+                BlockValue { block: 7, value: 2e-3 },
+            ],
             ..ParameterValues::default()
         };
-        let states = values.settings().map(ParameterState::from);
+        let settings = values.settings();
+        let states: Vec<_> = settings.into_iter().map(ParameterState::from).collect();
         assert_eq!(to_values(&states), values);
     }
 
     #[test]
     fn an_element_of_another_version_is_skipped() {
-        let valid =
-            ParameterState { parameter: Parameter::Damping as u32, form: 1, ..Default::default() };
+        let valid = ParameterState {
+            parameter: Parameter::Damping as u32,
+            block: -1,
+            form: 1,
+            ..Default::default()
+        };
         for unknown in [
             ParameterState { parameter: 99, ..valid },
+            ParameterState { block: 0, ..valid },
             ParameterState { form: 3, ..valid },
             ParameterState { parameter: Parameter::Stiffness as u32, constraint_kind: 4, ..valid },
         ] {

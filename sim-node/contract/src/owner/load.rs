@@ -23,7 +23,7 @@ use sim_types::{
 };
 
 /// A load: the data that an owner publishes once, and the sizes of its later messages.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct Load<'a> {
     /// Common part of the headers. The owner sets `count` for each service.
     pub header: LoadHeader,
@@ -95,7 +95,7 @@ impl Capacities {
             bends: single(load.bends.len()),
             surface: single(load.triangles.len()),
             tears: many(&TEARS, load.constraints.len()),
-            parameters: many(&PARAMETERS, SETTINGS_COUNT),
+            parameters: many(&PARAMETERS, SETTINGS_COUNT + block_count(load.bends)),
             colliders: many(&COLLIDERS, load.collider_count),
         }
     }
@@ -225,6 +225,12 @@ impl LoadWriters {
         self.keyframe.refresh();
         self.particles.refresh();
     }
+}
+
+/// Returns the number of blocks up to the last one with bends.
+fn block_count(bends: &[BendState]) -> usize {
+    let last = bends.iter().map(|bend| bend.block).max();
+    last.and_then(|block| usize::try_from(block + 1).ok()).unwrap_or(0)
 }
 
 /// Returns the length of a payload. The limits of the contract keep it within u32.

@@ -94,7 +94,7 @@ fn write_state_layouts(text: &mut String) {
     layout!(text, TearsHeader { run_id, step, since_step, new_count, count });
     layout!(text, TornConstraint { constraint, cause });
     layout!(text, ParametersHeader { run_id, step, count, spare });
-    layout!(text, ParameterState { parameter, constraint_kind, form, value });
+    layout!(text, ParameterState { parameter, constraint_kind, block, form, value });
     layout!(
         text,
         ColliderState {

@@ -221,7 +221,8 @@ fn a_load_beyond_a_limit_leaves_the_old_one_as_it_was() {
     let mut owner = create_owner(&domain.endpoint()).unwrap();
     publish_everything(&owner, 5);
     with_new_load(|load| {
-        let error = owner.load(&Load { collider_count: COLLIDERS_MAX + 1, ..*load }).unwrap_err();
+        let error =
+            owner.load(&Load { collider_count: COLLIDERS_MAX + 1, ..load.clone() }).unwrap_err();
         assert_eq!(
             error.to_string(),
             "the scene has 65537 colliders, but at most 65536 are possible: choose a smaller scene"

@@ -41,7 +41,10 @@ fn a_state_contains_all_messages_up_to_it() {
         (second.colliders.header.step, &second.colliders.colliders[..]),
         (5, &colliders(5)[..])
     );
-    assert_eq!((second.parameters.header.step, second.parameters.values), (5, parameters(5)));
+    assert_eq!(
+        (second.parameters.header.step, second.parameters.values.clone()),
+        (5, parameters(5))
+    );
     assert!(second.changes.contains(&Change::Outcome(outcome)));
     assert!(tap.next_state(|_| {}).is_none());
     assert!(tap.drain_errors().is_empty());
@@ -81,7 +84,7 @@ fn the_newest_state_contains_the_changes_of_skipped_states() {
     };
     (1..=3).for_each(publish);
     let state = tap.latest_state(|_| {}).unwrap();
-    assert_eq!((state.header.step, state.parameters.values), (3, parameters(3)));
+    assert_eq!((state.header.step, state.parameters.values.clone()), (3, parameters(3)));
     let steps = state.changes.iter().filter_map(|change| match change {
         Change::Parameters(header, _) => Some(header.step),
         _ => None,

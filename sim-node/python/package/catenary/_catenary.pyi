@@ -335,7 +335,10 @@ class Action:
     ) -> Action: ...
     @staticmethod
     def set(
-        parameter: str, value: float | Vector | None, kind: str | None = None
+        parameter: str,
+        value: float | Vector | None,
+        kind: str | None = None,
+        block: int | None = None,
     ) -> Action: ...
     @staticmethod
     def load(scene: str | PathLike[str]) -> Action: ...

@@ -109,12 +109,13 @@ class Commands(ABC, Generic[Result]):
             )
         )
 
-    def set(self, **values: float | Vector | Mapping[str, float] | None) -> Result:
+    def set(self, **values: float | Vector | Mapping[str, float] | Mapping[int, float] | None) -> Result:
         """Sets parameters by name, such as `set(gravity=(0, 0, 0), damping=0.5)`. None turns one off.
 
         `compliance` and `stiffness` take a number for all constraints, or a dict with a number for each kind,
-        such as `{"shear": 0.5}`. `bending` replaces the rigidity of all bends. Each parameter is a command of
-        its own, in the order given; the result is that of the last one.
+        such as `{"shear": 0.5}`. `bending` replaces the rigidity of all bends, or with a dict that of the bends of
+        some generated blocks, such as `{1: 1e-3}` for the second one. Each value is a command of its own, in the
+        order given; the result is that of the last one.
         """
         actions = [action for name, value in values.items() for action in _settings(name, value)]
         if not actions:
@@ -131,4 +132,11 @@ def _settings(name: str, value: Any) -> list[Action]:
         return [Action.set(name, value)]
     if not value:
         raise TypeError(f"`{name}` is empty: give a number for a kind, such as {{'shear': 0.5}}")
-    return [Action.set(name, number, kind) for kind, number in value.items()]
+    return [_setting_of(name, part, number) for part, number in value.items()]
+
+
+def _setting_of(name: str, part: Any, value: Any) -> Action:
+    """The command for a kind of constraint, or for a generated block."""
+    if isinstance(part, str):
+        return Action.set(name, value, kind=part)
+    return Action.set(name, value, block=part)

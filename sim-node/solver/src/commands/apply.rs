@@ -1,11 +1,12 @@
 //! Applies actions: the only way from a command to the state.
 
-use sim_types::{Action, CLIENT_ID_END, KindFilter, Parameter, ParameterValue, Reason, Text};
+use sim_types::{Action, CLIENT_ID_END, Parameter, ParameterValue, Reason, Text};
 
 use super::cut::{Sphere, Sweep};
 use super::{Grab, Push};
 use crate::contacts::bodies::driven_body::BodyMotion;
 use crate::frame::Pose;
+use crate::parameters::Target;
 use crate::solver::Solver;
 
 /// Effect of an applied action.
@@ -104,8 +105,9 @@ impl Solver {
                 self.drive_body(collider, Pose { translation, rotation }, &motion)?;
                 return Ok(Applied::Target);
             }
-            Action::Set { parameter, value, constraint_kind } => {
-                return self.apply_setting(parameter.as_str(), value, constraint_kind);
+            Action::Set { parameter, value, constraint_kind, block } => {
+                let target = Target::new(constraint_kind, block)?;
+                return self.apply_setting(parameter.as_str(), value, target);
             }
             Action::Reset => {
                 self.reset();
@@ -130,14 +132,9 @@ impl Solver {
         &mut self,
         parameter: &str,
         value: ParameterValue,
-        filter: Option<KindFilter>,
+        target: Target,
     ) -> Result<Applied, Reason> {
-        let kind = match filter {
-            None => None,
-            Some(KindFilter::Known(kind)) => Some(kind),
-            Some(KindFilter::Unknown) => return Err(Reason::OutOfRange),
-        };
-        self.set(parameter, value, kind)?;
+        self.set_for(parameter, value, target)?;
         match value {
             ParameterValue::Number(scale) if parameter == Parameter::TimeScale.name() => {
                 Ok(Applied::Control(Control::TimeScale(scale)))

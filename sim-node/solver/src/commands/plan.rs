@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use sim_types::{Action, KindFilter};
+use sim_types::Action;
 
 use super::preparation::{Plan, Prepared, Spare};
 use crate::constraints::tethers::TetherBasis;
-use crate::parameters::{Affected, Parameters};
+use crate::parameters::{Affected, Parameters, Target};
 use crate::solver::Solver;
 use crate::state::keyframe::Keyframe;
 
@@ -18,21 +18,19 @@ impl Solver {
     /// Returns the work that makes a reset, or settings that follow each other, cheap. None if they are
     /// cheap already, if [`Self::apply`] rejects them, and for other actions.
     pub fn plan(&self, actions: impl IntoIterator<Item = Action>) -> Option<Plan> {
-        let (mut parameters, mut affected) = (self.parameters, Affected::Nothing);
+        let (mut parameters, mut affected) = (self.parameters.clone(), Affected::Nothing);
         for action in actions {
             match action {
                 Action::Reset => {
                     let basis = self.settings.has_tethers().then(|| self.initial_tether_basis());
                     return self.plan_for(&self.initial_parameters, &[], basis);
                 }
-                Action::Set { parameter, value, constraint_kind } => {
-                    let kind = match constraint_kind {
-                        None => None,
-                        Some(KindFilter::Known(kind)) => Some(kind),
-                        Some(KindFilter::Unknown) => continue,
-                    };
+                Action::Set { parameter, value, constraint_kind, block } => {
+                    let target = Target::new(constraint_kind, block);
                     // A rejected setting changes nothing.
-                    let set = parameters.set(parameter.as_str(), value, kind, self.context());
+                    let set = target.and_then(|target| {
+                        parameters.set(parameter.as_str(), value, target, self.context())
+                    });
                     affected = affected.max(set.unwrap_or(Affected::Nothing));
                 }
                 _ => {}
@@ -75,7 +73,7 @@ impl Solver {
             kernels: self.store.kernels(),
             setup: self.setup(parameters),
             fields: self.scene_fields(parameters),
-            parameters: *parameters,
+            parameters: parameters.clone(),
             torn: torn.to_vec(),
             tether_basis,
         })

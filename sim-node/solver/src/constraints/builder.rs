@@ -59,7 +59,7 @@ impl<'a> ConstraintBuilder<'a> {
     /// Scaled compliance of a bend whose path is not torn.
     pub(crate) fn bend_compliance(&self, index: u32) -> f32 {
         let bend = self.model.bends[index as usize];
-        bend.scaled_compliance(self.parameters.rigidity(bend.rigidity), self.setup.h)
+        bend.scaled_compliance(self.parameters.rigidity(&bend), self.setup.h)
     }
 
     /// Builds only the limits of a constraint that is not torn.

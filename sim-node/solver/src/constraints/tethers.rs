@@ -142,12 +142,13 @@ impl Tethers {
             let CandidatePath { particle, root, .. } = path;
             links.push_paths(&mut paths, Reached { particle, root, length, tether });
         }
-        Self { basis, parameters: Some(*parameters), all, moving_roots: Vec::new() }
+        Self { basis, parameters: Some(parameters.clone()), all, moving_roots: Vec::new() }
     }
 
     /// Returns true if [`Self::new`] derives the same tethers from these values.
     pub(crate) fn are_derived_from(&self, parameters: &Parameters, basis: &TetherBasis) -> bool {
-        self.basis == *basis && self.parameters.is_some_and(|own| own.has_softness_of(parameters))
+        self.basis == *basis
+            && self.parameters.as_ref().is_some_and(|own| own.has_softness_of(parameters))
     }
 
     /// Restores the tethers that were dropped since they were derived.

@@ -185,8 +185,8 @@ impl Scene {
             model.push_explicit_bend(bend);
         }
         let mut first = self.particles.len() as u64;
-        for (block, generator) in (0..).zip(&self.generators) {
-            model.set_block(block);
+        for generator in &self.generators {
+            model.begin_block();
             #[allow(
                 clippy::cast_possible_truncation,
                 reason = "a scene has at most 2^24 particles"

@@ -23,6 +23,8 @@ pub(crate) struct Model {
     limit_indices: Vec<u32>,
     /// Block of the bends that are pushed.
     block: Option<u32>,
+    /// By generated block: it has bends.
+    pub(crate) bent_blocks: Vec<bool>,
     pub(crate) bends: Vec<Bend>,
     /// By bend: the group of independent bends that its shape declares.
     pub(crate) bend_families: Vec<Option<u32>>,
@@ -47,9 +49,12 @@ impl Model {
         }
     }
 
-    /// Sets the generated block of the bends that are pushed from now on.
-    pub(crate) fn set_block(&mut self, block: u32) {
+    /// Begins the next generated block: bends that are pushed from now on belong to it.
+    pub(crate) fn begin_block(&mut self) {
+        #[allow(clippy::cast_possible_truncation, reason = "a scene has at most 2^24 blocks")]
+        let block = self.bent_blocks.len() as u32;
         self.block = Some(block);
+        self.bent_blocks.push(false);
     }
 
     /// Returns the limits of a constraint that replace the scene's.
@@ -97,6 +102,9 @@ impl Model {
     /// Adds a bend, with the family that its shape declares.
     pub(crate) fn push_bend(&mut self, bend: Bend, family: Option<u32>) {
         self.bends.push(Bend { block: self.block, ..bend });
+        if let Some(is_bent) = self.bent_blocks.last_mut() {
+            *is_bent = true;
+        }
         self.bend_families.push(family);
     }
 

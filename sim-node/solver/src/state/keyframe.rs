@@ -13,7 +13,7 @@ use crate::solver::Solver;
 use crate::step::drive::ActiveGrab;
 
 /// First four bytes of an encoded keyframe, little-endian. It changes with the fields below.
-const KEYFRAME_VERSION: u32 = 3;
+const KEYFRAME_VERSION: u32 = 4;
 
 /// The state beside the particles of a snapshot. Both together are the complete state after a step.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -181,7 +181,7 @@ impl Solver {
             torn: self.torn().to_vec(),
             tear_causes: self.tear_causes().to_vec(),
             tethers: self.tethers.basis.clone(),
-            parameters: self.parameters,
+            parameters: self.parameters.clone(),
             moved_anchors: Moved::all(self.anchors.moved.iter()),
             moved_colliders: Moved::all(self.colliders.iter().map(|one| &one.moved)),
         }
@@ -198,7 +198,7 @@ impl Solver {
         let (fixed, grab) = (index + 4, index + 10 + 12 + 5);
         let (torn, cause, moved) = (link, 1, 5 + 12 + 16);
         let (root, basis) = if self.settings.has_tethers() { (index, link) } else { (0, 0) };
-        let parameters = 2 * 12 + 4 * 4 + 2 * 5 + 9 * 5;
+        let parameters = 2 * 12 + 4 * 4 + 2 * 5 + 9 * 5 + 10 + self.block_count() * 5;
         let head = 4 + 1 + 10 + 8 * 10 + parameters;
         head + self.particle_count() * (fixed + grab + root)
             + self.constraint_count() * (torn + cause + basis)

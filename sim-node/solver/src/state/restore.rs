@@ -63,7 +63,7 @@ impl Solver {
         self.grabs.extend_from_slice(&keyframe.grabs);
         self.scene_step = keyframe.scene_step;
         self.is_put_in_place = false;
-        self.parameters = keyframe.parameters;
+        self.parameters.clone_from(&keyframe.parameters);
         self.restore_constraints(keyframe);
         self.restore_frames(keyframe);
         self.state_hash = state_hash(&self.particles.states, self.torn.hash_seed());

@@ -21,20 +21,25 @@ impl ParticleStore {
         scene: SceneFields,
         is_torn: &[bool],
     ) -> Configured {
-        let affected = self.derived_from.map(|from| builder.parameters.affected_since(&from));
+        let affected =
+            self.derived_from.as_ref().map(|from| builder.parameters.affected_since(from));
         let configured = match affected {
             Some(Affected::Nothing) => Configured::InPlace,
             Some(Affected::Limits) => self.configure_limits(builder, scene),
             _ => self.configure_all(builder, scene),
         };
-        self.derived_from = Some(*builder.parameters);
+        match &mut self.derived_from {
+            Some(from) => from.clone_from(builder.parameters),
+            none => *none = Some(builder.parameters.clone()),
+        }
         self.follow_tears(builder, is_torn);
         configured
     }
 
     /// Returns true if the constraints are those of these parameters.
     pub(crate) fn is_derived_from(&self, parameters: &Parameters) -> bool {
-        self.derived_from.is_some_and(|from| parameters.affected_since(&from) == Affected::Nothing)
+        let is_same = |from| parameters.affected_since(from) == Affected::Nothing;
+        self.derived_from.as_ref().is_some_and(is_same)
     }
 
     fn configure_all(&mut self, builder: &ConstraintBuilder<'_>, scene: SceneFields) -> Configured {

@@ -7,7 +7,7 @@ use sim_contract::{
 use sim_solver::{PlacedCollider, Scene, Solver};
 
 /// Run and step of a load.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(super) struct LoadPlace {
     pub(super) run_id: u64,
     /// First step that shows the load.

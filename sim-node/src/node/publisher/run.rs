@@ -42,7 +42,7 @@ impl Publisher {
             Run::New { run_id, .. } => (run_id, 0, 0),
         };
         let parameters = parameter_values(solver, time_scale);
-        let place = LoadPlace { run_id, step, topology_revision, parameters };
+        let place = LoadPlace { run_id, step, topology_revision, parameters: parameters.clone() };
         let Self { owner, outcomes, .. } = self;
         let replaced = owner.load_after(&messages.at(place), |owner| match run {
             Run::Same { .. } => Ok(()),

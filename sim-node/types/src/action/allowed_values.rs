@@ -46,11 +46,19 @@ impl Action {
 
     fn allowed_ranges(&self) -> Option<String> {
         let values = match self {
-            Self::Set { parameter, constraint_kind, .. } => {
+            Self::Set { parameter, constraint_kind, block, .. } => {
                 let info = Parameter::from_name(parameter.as_str())?.info();
                 let has_kind = constraint_kind.is_some() && !info.is_per_kind;
                 let kind = if has_kind { ", no kind" } else { "" };
-                return Some(format!("{}{}{kind}", info.allowed_values(), work(info.parameter)));
+                let block = match block {
+                    Some(_) if info.parameter == Parameter::Bending => {
+                        ", for a generated block of the scene, counted from 0"
+                    }
+                    Some(_) => ", no block",
+                    None => "",
+                };
+                let values = info.allowed_values();
+                return Some(format!("{values}{}{kind}{block}", work(info.parameter)));
             }
             Self::Grab { .. } | Self::Move { .. } => {
                 "coordinates within 1e7, z 0 in 2-D, over 0 to 0.25 s"
@@ -115,9 +123,22 @@ mod tests {
             parameter: Text::cut("damping"),
             value: ParameterValue::Number(1.0),
             constraint_kind: Some(KindFilter::Known(ConstraintKind::Bend)),
+            block: None,
         };
         let values = action.allowed_values(Reason::OutOfRange).unwrap();
         assert_eq!(values, "a number >= 0, or off for 0, no kind");
+    }
+
+    #[test]
+    fn a_wrong_block_is_named() {
+        let values = |name: &str| {
+            let (parameter, value) = (Text::cut(name), ParameterValue::Number(1.0));
+            let action = Action::Set { parameter, value, constraint_kind: None, block: Some(9) };
+            action.allowed_values(Reason::OutOfRange).unwrap()
+        };
+        assert_eq!(values("damping"), "a number >= 0, or off for 0, no block");
+        let blocks = "a number >= 0, for a generated block of the scene, counted from 0";
+        assert_eq!(values("bending"), blocks);
     }
 
     #[test]

@@ -51,7 +51,7 @@ fn states(file: &str) -> Vec<Recorded> {
             hash: frame.row.state_hash,
             particles,
             torn: torn.clone(),
-            parameters,
+            parameters: parameters.clone(),
         });
     }
     states
@@ -64,7 +64,7 @@ fn apply(frame: &Frame, torn: &mut Vec<u32>, parameters: &mut ParameterValues) {
     for update in &frame.updates {
         match update {
             Message::Tears(row) => torn.extend(&row.constraints),
-            Message::Parameters(row) => *parameters = row.values,
+            Message::Parameters(row) => *parameters = row.values.clone(),
             _ => {}
         }
     }
@@ -81,7 +81,7 @@ fn next_run(tap: &mut Tap, run_id: u64) -> (u64, u64, Recorded) {
                 hash: header.state_hash,
                 particles: bytemuck::cast_slice(state.particles).to_vec(),
                 torn: state.torn.indices().collect(),
-                parameters: state.parameters.values,
+                parameters: state.parameters.values.clone(),
             };
             (header.run_id, header.step, recorded)
         })

@@ -60,14 +60,15 @@ pub(super) fn actions(
         Command::Mark { text } => {
             Action::Mark { text: Text::new(&text).map_err(|_| Reason::OutOfRange)? }
         }
-        Command::Set { parameter, value, constraint_kind } => {
+        Command::Set { parameter, value, constraint_kind, block } => {
             let parameter = Text::new(&parameter).map_err(|_| Reason::UnknownParameter)?;
-            Action::Set { parameter, value, constraint_kind }
+            Action::Set { parameter, value, constraint_kind, block }
         }
         Command::Rate { value } => Action::Set {
             parameter: Text::cut(Parameter::TimeScale.name()),
             value: ParameterValue::Number(value),
             constraint_kind: None,
+            block: None,
         },
         Command::Seek { .. } | Command::Loop { .. } | Command::Ghost { .. } => {
             return Err(Refusal::OnlyReplay);

@@ -355,7 +355,9 @@ impl Link {
         run?;
         updates.keyframes.into_iter().for_each(|(step, bytes)| self.keyframes.add(step, bytes));
         self.undo.follow(self.newest.get(), &mut self.client, sinks);
-        self.parameters = updates.parameters.or(self.parameters);
+        if updates.parameters.is_some() {
+            self.parameters = updates.parameters;
+        }
         self.publish_parameters(sinks);
         Ok(())
     }
@@ -364,8 +366,8 @@ impl Link {
     /// if the node is paused, so they do not wait for a state.
     fn publish_parameters(&mut self, sinks: &Sinks) {
         let Some(state) = self.newest.get() else { return };
-        let initial = Some(state.load.summary.parameters);
-        let text = ParametersText { is_complete: true, values: self.parameters, initial };
+        let initial = Some(state.load.summary.parameters.clone());
+        let text = ParametersText { is_complete: true, values: self.parameters.clone(), initial };
         if self.published_parameters.as_ref() != Some(&text) {
             sinks.publish(&Update::Parameters(&text));
             self.published_parameters = Some(text);
@@ -405,7 +407,7 @@ impl Link {
             return;
         }
         if let (Some(status), Some(state)) = (&self.status, self.newest.get()) {
-            let gravity = self.parameters.map_or([0.0; 3], |values| values.gravity);
+            let gravity = self.parameters.as_ref().map_or([0.0; 3], |values| values.gravity);
             let statistics = statistics(status, state, shown, gravity);
             sinks.publish(&Update::Statistics(&statistics));
         }

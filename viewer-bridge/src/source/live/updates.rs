@@ -27,7 +27,7 @@ impl Updates {
     pub(super) fn add(&mut self, update: &Update<'_>) {
         match *update {
             Update::Topology(header, _) => self.run_id = Some(header.run_id),
-            Update::Parameters(_, values) => self.parameters = Some(*values),
+            Update::Parameters(_, values) => self.parameters = Some(values.clone()),
             Update::Outcome(outcome) => self.outcomes.push(*outcome),
             Update::Status(status) => {
                 self.run_id = Some(status.run_id);

@@ -299,11 +299,12 @@ impl<'a> Player<'a> {
     /// Publishes the parameters at this step, if they have changed. Recordings before format 3 lack
     /// them; then those of the scene are shown as incomplete.
     fn publish_parameters(&mut self) {
-        let initial = self.recording.load.summary.parameters;
-        let recorded = self.state.parameters.as_ref().map(|row| row.values);
-        let values = recorded.unwrap_or(initial);
+        let initial = self.recording.load.summary.parameters.clone();
+        let recorded = self.state.parameters.as_ref().map(|row| row.values.clone());
+        let is_complete = recorded.is_some();
+        let values = recorded.unwrap_or_else(|| initial.clone());
         let text = ParametersText {
-            is_complete: recorded.is_some(),
+            is_complete,
             values: Some(ParameterValues { time_scale: self.playhead.rate, ..values }),
             initial: Some(initial),
         };
@@ -391,7 +392,7 @@ impl<'a> Player<'a> {
             self.sinks.publish(&Update::Status(status));
         }
         if self.sinks.has_demand(Demand::Statistics) {
-            let values = self.parameters.as_ref().and_then(|text| text.values);
+            let values = self.parameters.as_ref().and_then(|text| text.values.as_ref());
             let gravity = values.map_or([0.0; 3], |values| values.gravity);
             let (state, shown, playhead) = (&self.state, &self.shown, &self.playhead);
             let statistics = statistics(self.recording, state, shown, playhead, gravity);

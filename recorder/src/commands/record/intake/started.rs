@@ -234,9 +234,10 @@ impl Started {
                 self.torn_count = header.count;
                 (!new.is_empty()).then(|| Message::Tears(TearsRow::new(header.step, new)))
             }
-            Change::Parameters(header, values) => {
-                Some(Message::Parameters(ParametersRow { step: header.step, values: *values }))
-            }
+            Change::Parameters(header, values) => Some(Message::Parameters(ParametersRow {
+                step: header.step,
+                values: values.clone(),
+            })),
             Change::Forces(header, rows) => self.forces_row(header, rows),
             Change::Keyframe(header, bytes) => self.keyframe_row(header, bytes),
         }
