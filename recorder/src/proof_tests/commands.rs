@@ -111,6 +111,7 @@ pub(super) const COMMANDS: &str = r#"
     {"step":52,"kind":"set","parameter":"compliance","value":1e-5}
     {"step":53,"kind":"set","parameter":"stiffness","value":0.5}
     {"step":54,"kind":"set","parameter":"bending","value":0.001}
+    {"step":54,"kind":"set","parameter":"bending","value":0.03,"block":0}
     {"step":55,"kind":"set","parameter":"contact","value":0.05}
     {"step":56,"kind":"set","parameter":"contact_friction","value":0.5}
     {"step":58,"kind":"set","parameter":"contact","value":null}

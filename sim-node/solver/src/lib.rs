@@ -51,8 +51,8 @@ pub use kernels::Kernels;
 pub use kernels::worker_pool::THREADS_MAX;
 pub use scene::{ColliderGeometry, Scene, SceneError, SolverSettings};
 pub use sim_types::{
-    Action, COORDINATE_MAX, ConstraintKind, Method, PARAMETERS, Parameter, ParameterValue,
-    ParameterValues, ParticleFlags, Reason, TearCause,
+    Action, BlockValue, COORDINATE_MAX, ConstraintKind, Method, PARAMETERS, Parameter,
+    ParameterValue, ParameterValues, ParticleFlags, Reason, TearCause,
 };
 pub use solver::Solver;
 pub use state::forces::{ColliderImpulse, Forces, FrameImpulse, ParticleImpulse};

@@ -22,6 +22,7 @@ enum RandomCommand {
     MoveAnchor([f32; 3]),
     MoveCollider(u32, [f32; 3]),
     Set(usize, f32),
+    SetBlock(u32, f32),
     Reset,
 }
 
@@ -57,6 +58,7 @@ fn random_command() -> impl Strategy<Value = RandomCommand> {
         1 => point.clone().prop_map(RandomCommand::MoveAnchor),
         1 => (0..5_u32, point).prop_map(|(index, to)| RandomCommand::MoveCollider(index, to)),
         3 => (0..SETTINGS.len(), 0.0..1.0_f32).prop_map(|(which, value)| RandomCommand::Set(which, value)),
+        2 => (0..6_u32, 0.0..0.1_f32).prop_map(|(block, value)| RandomCommand::SetBlock(block, value)),
         3 => Just(RandomCommand::Reset),
     ]
 }
@@ -89,6 +91,9 @@ fn apply(solver: &mut Solver, command: &RandomCommand) {
         RandomCommand::Set(which, share) => {
             let (name, low, high) = SETTINGS[which];
             solver.set(name, ParameterValue::Number(low + share * (high - low)), None)
+        }
+        RandomCommand::SetBlock(block, value) => {
+            solver.set_for_block("bending", ParameterValue::Number(value), block)
         }
         RandomCommand::Reset => {
             solver.reset();

@@ -104,6 +104,7 @@ fn a_change_of_a_parameter_in_use_allocates_nothing() {
             solver.set(name, first, None).unwrap();
             solver.step();
         }
+        let has_bends = solver.bend_count() > 0;
         let before = allocations();
         for (name, [first, second]) in changes {
             for value in [second, first] {
@@ -111,6 +112,12 @@ fn a_change_of_a_parameter_in_use_allocates_nothing() {
                 solver.finish_boundary();
                 solver.step();
             }
+        }
+        for value in [0.02, 0.03] {
+            let set = solver.set_for_block("bending", ParameterValue::Number(value), 0);
+            assert_eq!(set.is_ok(), has_bends);
+            solver.finish_boundary();
+            solver.step();
         }
         assert_eq!(allocations() - before, 0);
     }

@@ -1,6 +1,7 @@
 //! Bends against beam theory: the deflection of cantilevers, the energy of a cylinder, the overhang by
 //! which Peirce measures cloth, and the invariants of free bodies.
 
+mod blocks;
 mod hinges;
 
 use sim_solver::{Bend, ConstraintKind, ParameterValue, Reason, Solver};
