@@ -10,6 +10,7 @@ import sys
 import iceoryx2 as iox2
 
 UINT32, UINT64, FLOAT32 = ctypes.c_uint32, ctypes.c_uint64, ctypes.c_float
+INT32, FLOAT64 = ctypes.c_int32, ctypes.c_double
 
 
 def struct(name, *fields):
@@ -38,10 +39,29 @@ TearsHeader = struct(
     "TearsHeader", (UINT64, "run_id step since_step"), (UINT32, "new_count count")
 )
 ParameterState = struct(
-    "ParameterState", (UINT32, "parameter constraint_kind form"), (FLOAT32 * 3, "value")
+    "ParameterState",
+    (UINT32, "parameter constraint_kind"),
+    (INT32, "block"),
+    (UINT32, "form"),
+    (FLOAT32 * 3, "value"),
 )
 ParametersHeader = struct(
     "ParametersHeader", (UINT64, "run_id step"), (UINT32, "count spare")
+)
+
+BendState = struct(
+    "BendState",
+    (UINT32 * 4, "particles"),
+    (FLOAT32 * 4, "coefficients"),
+    (FLOAT32, "geometry rigidity rest"),
+    (UINT32, "shape"),
+    (INT32, "block"),
+)
+LoadHeader = struct(
+    "LoadHeader",
+    (UINT64, "run_id step scene_hash"),
+    (FLOAT64 * 3, "origin"),
+    (UINT32, "topology_revision count particle_count rate_hz method spare"),
 )
 
 
@@ -75,6 +95,7 @@ def main(prefix, root):
     snapshot, particles = receive(node, "sim/particles", ParticleState, SnapshotHeader)
     tears, torn = receive(node, "sim/tears", TornConstraint, TearsHeader)
     header, parameters = receive(node, "sim/parameters", ParameterState, ParametersHeader)
+    load, bends = receive(node, "sim/bends", BendState, LoadHeader)
     report = {
         "contract_version": snapshot.contract_version,
         "step": snapshot.step,
@@ -84,8 +105,12 @@ def main(prefix, root):
         "torn": [[one.constraint, one.cause] for one in torn[: tears.count]],
         "new_tears": tears.new_count,
         "parameters": [
-            [one.parameter, one.constraint_kind, one.form, list(one.value)]
+            [one.parameter, one.constraint_kind, one.block, one.form, list(one.value)]
             for one in parameters[: header.count]
+        ],
+        "bends": [
+            [list(one.particles), list(one.coefficients), one.rigidity, one.shape, one.block]
+            for one in bends[: load.count]
         ],
     }
     print(json.dumps(report))

@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 
 use integration_tests::{DEADLINE, Process, Program, Sandbox, ctl, record, wait_for};
 use serde_json::{Value, json};
-use sim_contract::{CONTRACT_VERSION, Client, TearCause};
+use sim_contract::{CONTRACT_VERSION, Client, Parameter, TearCause};
+use sim_solver::{Bend, Scene, Solver, builtin};
 
 /// Runs a script of `tests/python`, and returns its report.
 fn python(sandbox: &Sandbox, script: &str, args: &[&str]) -> Value {
@@ -121,7 +122,7 @@ fn the_iceoryx2_python_package_reads_particles_tears_and_parameters() {
     assert_eq!(read["torn"], json!([[40, TearCause::Cut as u32]]));
     assert_eq!(read["new_tears"], 1);
     // Gravity is the first parameter, and a vector has form 2.
-    assert_eq!(read["parameters"][0], json!([0, 0, 2, [0.0, -1.5, 0.0]]));
+    assert_eq!(read["parameters"][0], json!([0, 0, -1, 2, [0.0, -1.5, 0.0]]));
     // 16 parameters have one value, and two have one for each of the four constraint kinds.
     assert_eq!(read["parameters"].as_array().map(Vec::len), Some(16 + 2 * 4));
     let mut client = Client::attach(&sandbox.endpoint()).unwrap();
@@ -130,6 +131,30 @@ fn the_iceoryx2_python_package_reads_particles_tears_and_parameters() {
         let position: Vec<f64> = serde_json::from_value(position.clone()).unwrap();
         let expected = snapshot.particles()[index].position.map(f64::from);
         assert_eq!(position, expected);
+    }
+}
+
+/// The second flag is stiffer than the first.
+#[test]
+#[ignore = "needs Python"]
+fn the_iceoryx2_python_package_reads_bends_and_the_bending_of_a_block() {
+    let sandbox = Sandbox::new();
+    let _node = Process::start_ready(Program::SimNode, &sandbox, &["run", "two-flags", "--paused"]);
+    ctl(&sandbox, &["set", "bending", "0.25", "--block", "1"]);
+    ctl(&sandbox, &["step"]);
+    let prefix = format!("{}_", sandbox.domain());
+    let root = format!("/tmp/catenary-{}-{}", rustix::process::getuid().as_raw(), sandbox.domain());
+    let read = python(&sandbox, "read_live.py", &[&prefix, &root]);
+    let last = read["parameters"].as_array().and_then(|all| all.last());
+    assert_eq!(last, Some(&json!([Parameter::Bending as u32, 0, 1, 1, [0.25, 0.0, 0.0]])));
+    let bends = read["bends"].as_array().unwrap();
+    let scene = Scene::from_toml(builtin::text("two-flags").unwrap(), "two-flags").unwrap();
+    let expected: Vec<_> = Solver::new(&scene).bends().collect();
+    assert_eq!(bends.len(), expected.len());
+    for (bend, expected) in bends.iter().zip(expected) {
+        let Bend { particles, coefficients, rigidity, shape, block, .. } = expected;
+        let fields = json!([particles, coefficients, rigidity, shape.number(), block.unwrap()]);
+        assert_eq!(*bend, fields);
     }
 }
 

@@ -1,5 +1,7 @@
 //! A connection to a running node.
 
+mod restoring;
+
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -8,10 +10,7 @@ use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use recorder::{CollidersRow, StatusRow};
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
-use sim_contract::{
-    Client, Endpoint, GivenState, OwnerState, ParticleState, ReadError, Reason, RequestError,
-    SnapshotHeader,
-};
+use sim_contract::{Client, Endpoint, OwnerState, ReadError, Reason, RequestError, SnapshotHeader};
 
 use crate::arguments;
 use crate::attach::attach;
@@ -458,31 +457,6 @@ impl Node {
 
     fn __repr__(&self) -> String {
         format!("<catenary.Node {}>", self.endpoint)
-    }
-}
-
-impl Node {
-    /// Gives a state to the node, and waits for the outcome.
-    fn give(&self, py: Python<'_>, state: &GivenState<'_>, timeout: f64) -> PyResult<Outcome> {
-        let sent = self
-            .call(py, |client| client.send_state(state).map_err(|error| request_error(&error)))?;
-        let outcome = self.outcome(py, sent.sequence(), Some(timeout));
-        self.call(py, |client| {
-            client.take_back(sent);
-            Ok(())
-        })?;
-        outcome?.require_applied(py)
-    }
-
-    /// Gives positions and velocities to the node.
-    fn give_motion(
-        &self,
-        py: Python<'_>,
-        particles: &[ParticleState],
-        timeout: f64,
-    ) -> PyResult<Outcome> {
-        let scene_hash = self.latched(py, Client::topology)?.header.scene_hash;
-        self.give(py, &GivenState { scene_hash, particles, keyframe: None }, timeout)
     }
 }
 

@@ -246,8 +246,8 @@ impl Simulation {
 
     /// Returns the bends.
     fn bends(&self, py: Python<'_>) -> PyResult<Bends> {
-        let bends =
-            self.with(py, |running| Ok(running.solver.bends().map(bend_state).collect::<Vec<_>>()))?;
+        let bends = self
+            .with(py, |running| Ok(running.solver.bends().map(bend_state).collect::<Vec<_>>()))?;
         Bends::new(py, &bends)
     }
 

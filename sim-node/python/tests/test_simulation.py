@@ -56,6 +56,53 @@ def test_a_state_continues_in_another_simulation_and_after_pickling() -> None:
         catenary.Simulation("rope").restore(state)
 
 
+def test_the_energy_of_a_bend_follows_from_its_fields() -> None:
+    # Two parts of 1 m at a right angle: the second difference of their ends is (-1, 1, 0).
+    simulation = catenary.Simulation(
+        toml="""
+        version = 1
+        [[particle]]
+        position = [1, 0, 0]
+        [[particle]]
+        position = [0, 0, 0]
+        [[particle]]
+        position = [0, 1, 0]
+        [[bend]]
+        particles = [0, 1, 2]
+        rigidity = 0.5
+        """
+    )
+    bends = simulation.bends()
+    assert len(bends) == 1 and catenary.BEND_SHAPES[bends.shapes[0]] == "line"
+    assert bends.blocks.tolist() == [-1] and bends.rests.tolist() == [0]
+    positions = simulation.positions[bends.particles]
+    curvature = (bends.coefficients[:, :, None] * positions).sum(axis=1)
+    energies = (curvature**2).sum(axis=1) * bends.rigidities / (2 * bends.geometries)
+    # |C|^2 EI / (2 s^3), in J.
+    assert energies.tolist() == [2 * 0.5 / 2]
+
+
+def test_the_bending_of_a_block_has_the_bits_of_a_node(start_node: StartNode) -> None:
+    node = start_node("two-flags", "--paused")
+    simulation = catenary.Simulation("two-flags")
+    plain = catenary.Simulation("two-flags")
+    for target in (node, simulation):
+        target.set(bending={1: 0.25})
+        assert target.parameters()["bending_by_block"] == [{"block": 1, "value": 0.25}]
+    assert np.array_equal(node.bends().particles, simulation.bends().particles)
+    assert set(node.bends().blocks.tolist()) == {0, 1}
+    node.step(30)
+    simulation.step(30)
+    plain.step(30)
+    assert node.latest().hash == simulation.hash != plain.hash
+    with pytest.raises(catenary.Rejected, match="generated block"):
+        simulation.set(bending={2: 0.25})
+    with pytest.raises(catenary.Rejected, match="no block"):
+        simulation.set(damping={1: 0.25})
+    simulation.set(bending=0.5)
+    assert simulation.parameters()["bending_by_block"] == []
+
+
 def test_motion_is_replaced_at_once_as_in_a_node(start_node: StartNode) -> None:
     node = start_node("carried-cloth", "--paused")
     simulation = catenary.Simulation("carried-cloth")

@@ -155,7 +155,7 @@ fn fix_frees_shared_memory_that_no_file_in_the_root_names() {
     kill(node);
     let found = doctor(&sandbox, &["--json"]);
     let text = finding(&found, "leftovers")["text"].to_string();
-    assert!(text.contains("1 lock, 25 segments"), "{text}");
+    assert!(text.contains("1 lock, 27 segments"), "{text}");
     doctor(&sandbox, &["--fix", "--json"]);
     assert_eq!(segments(&sandbox), BTreeSet::new());
 }
@@ -174,7 +174,7 @@ fn fix_keeps_the_services_of_a_killed_node_that_a_living_client_has_open() {
         files.into_iter().filter(is_of_service).collect()
     };
     let before = of_services(files(&sandbox));
-    assert_eq!(before.len(), 30, "two for each service");
+    assert_eq!(before.len(), 32, "two for each service");
     assert_eq!(level(&doctor(&sandbox, &["--fix", "--json"]), "leftovers"), "ok");
     assert_eq!(of_services(files(&sandbox)), before);
     let next = node(&sandbox, "sim");

@@ -5,7 +5,7 @@ use thiserror::Error;
 
 use super::summary::SceneSummary;
 use crate::sink::Topology;
-use crate::wire::{Scene, SceneText, Stamp, scene_flag};
+use crate::wire::{Scene, SceneText, ShapeText, Stamp, scene_flag};
 
 /// A load of a scene.
 #[derive(Debug)]
@@ -70,7 +70,8 @@ impl Load {
                 unit: summary.unit.clone(),
                 up: summary.up.name().to_owned(),
                 run_id: format!("{:016x}", self.header.run_id),
-                shapes: summary.shapes.clone(),
+                shapes: self.shapes(),
+                has_bends: !self.bends.is_empty(),
                 anchors: summary.poses.anchored().collect(),
             },
             collider_meshes: summary.collider_meshes.clone(),
@@ -78,5 +79,17 @@ impl Load {
         };
         scene.set_geometry(particles, &self.constraints, &self.triangles);
         scene
+    }
+
+    /// The generated shapes. Each is a block of the scene.
+    fn shapes(&self) -> Vec<ShapeText> {
+        let mut shapes = self.summary.shapes.clone();
+        for bend in &self.bends {
+            let block = usize::try_from(bend.block).ok();
+            if let Some(shape) = block.and_then(|block| shapes.get_mut(block)) {
+                shape.has_bends = true;
+            }
+        }
+        shapes
     }
 }

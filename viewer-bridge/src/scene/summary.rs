@@ -26,7 +26,7 @@ pub struct SceneSummary {
     pub parameters: ParameterValues,
     /// Triangles of the colliders that are meshes.
     pub collider_meshes: ColliderMeshes,
-    /// The generated shapes, at most [`SHAPES_MAX`].
+    /// The generated shapes, at most [`SHAPES_MAX`]. The load says which of them have bends.
     pub shapes: Vec<ShapeText>,
     /// The colliders and anchors at load.
     pub poses: ScenePoses,
@@ -73,6 +73,7 @@ fn shape_text((shape, particles): (&Shape, Range<u64>)) -> ShapeText {
         shape: shape.name().to_owned(),
         first: particles.start,
         count: particles.end - particles.start,
+        has_bends: false,
     }
 }
 

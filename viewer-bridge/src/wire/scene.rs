@@ -59,6 +59,9 @@ pub struct SceneText {
     pub run_id: String,
     /// The generated shapes.
     pub shapes: Vec<ShapeText>,
+    /// The scene has bends, generated or explicit.
+    #[serde(default)]
+    pub has_bends: bool,
     /// The particles of each anchor.
     #[serde(default)]
     pub anchors: Vec<Vec<u32>>,
@@ -73,6 +76,9 @@ pub struct ShapeText {
     pub first: u64,
     /// Number of its particles.
     pub count: u64,
+    /// It has bends.
+    #[serde(default)]
+    pub has_bends: bool,
 }
 
 impl Scene {

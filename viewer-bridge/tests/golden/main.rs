@@ -47,7 +47,13 @@ fn scene() -> Scene {
             unit: "m".to_owned(),
             up: "y".to_owned(),
             run_id: "0123456789abcdef".to_owned(),
-            shapes: vec![ShapeText { shape: "rope".to_owned(), first: 1, count: 3 }],
+            shapes: vec![ShapeText {
+                shape: "rope".to_owned(),
+                first: 1,
+                count: 3,
+                has_bends: true,
+            }],
+            has_bends: true,
         },
         collider_meshes: [(2, triangle_mesh())].into(),
         ..Scene::default()

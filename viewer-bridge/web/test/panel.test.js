@@ -2,7 +2,7 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { ROWS, SLIDER_STEPS, editable, positionOf, rangeOf, restoring, rowsOf, typedValue, valueAt } from "../js/panel/parameters.js";
+import { ROWS, SLIDER_STEPS, editable, partsOf, positionOf, rangeOf, restoring, rowsOf, typedValue, unitOf, valueAt } from "../js/panel/parameters.js";
 import { valueOf } from "../js/net/messages.js";
 import { niceCeiling } from "../js/geometry/round.js";
 import { readable } from "../js/ui/format.js";
@@ -38,7 +38,7 @@ test("a scene in pixels widens the range of gravity and keeps zero in the middle
 });
 
 test("the panel shows compliance for XPBD and stiffness for PBD", () => {
-  const names = (method) => rowsOf(method).map((row) => row.name);
+  const names = (method) => rowsOf(method, false).map((row) => row.name);
   assert.ok(names("xpbd").includes("compliance") && !names("xpbd").includes("stiffness"));
   assert.ok(names("pbd").includes("stiffness") && !names("pbd").includes("compliance"));
 });
@@ -75,8 +75,34 @@ test("resetting the parameters changes those that differ, and names those that c
   const values = { gravity: [0, -9.81, 0], damping: 2, tear_force: 50, compliance: { structural: 1e-3, shear: 0.2 } };
   const rows = ["gravity", "damping", "tear_force", "compliance"].map(row);
   assert.deepEqual(restoring(rows, values, initial, ["structural", "shear"]), {
-    changes: [{ name: "damping", value: 0.3 }, { name: "tear_force", value: null }, { name: "compliance", value: 0.1, kind: "shear" }],
+    changes: [{ name: "damping", value: 0.3 }, { name: "tear_force", value: null }, { name: "compliance", value: 0.1, part: "shear" }],
     lost: ["Compliance"],
   });
   assert.deepEqual(restoring(rows, initial, initial, ["structural", "shear"]), { changes: [], lost: [] });
+});
+
+const SHAPES = [{ shape: "cloth", has_bends: true }, { shape: "web", has_bends: false }, { shape: "rope", has_bends: true }];
+
+test("a scene with bends has a row for them, with a choice of the shapes that bend", () => {
+  const names = (hasBends) => rowsOf("xpbd", hasBends).map((row) => row.name);
+  assert.ok(names(true).includes("bending") && !names(false).includes("bending"));
+  assert.deepEqual(partsOf(row("bending"), SHAPES, ["shear"]), [{ part: "0", text: "0 cloth" }, { part: "2", text: "2 rope" }]);
+  assert.deepEqual(partsOf(row("bending"), SHAPES.slice(1), ["shear"]), [], "all is the same");
+  assert.deepEqual(partsOf(row("compliance"), SHAPES, ["shear"]), [{ part: "shear", text: "shear" }]);
+  assert.deepEqual(partsOf(row("damping"), SHAPES, ["shear"]), []);
+});
+
+test("a rigidity is in N m, and in N m² for ropes", () => {
+  const unit = (part, shapes = SHAPES) => unitOf(row("bending"), shapes, part);
+  assert.deepEqual([unit("0"), unit("2"), unit("all"), unit("all", SHAPES.slice(1))], ["N m", "N m²", "N m", "N m²"]);
+  assert.equal(unitOf(row("compliance"), SHAPES, "all"), "m/N");
+});
+
+test("the bending of a block is its own, or that of all bends, and no command restores that of the scene", () => {
+  const values = { bending: 0.5, bending_by_block: [{ block: 2, value: 0.25 }] };
+  assert.deepEqual(["all", "0", "2"].map((part) => valueOf(values, "bending", part)), [0.5, 0.5, 0.25]);
+  const initial = { bending: null, bending_by_block: [] };
+  assert.deepEqual(restoring([row("bending")], values, initial, []), { changes: [], lost: ["Bending"] });
+  assert.deepEqual(restoring([row("bending")], { ...values, bending: null }, initial, []), { changes: [], lost: ["Bending"] });
+  assert.deepEqual(restoring([row("bending")], initial, initial, []), { changes: [], lost: [] });
 });

@@ -43,10 +43,16 @@ export function toNumber(value) {
   return value === "-inf" ? -Infinity : NaN;
 }
 
-/** A parameter, for one kind of constraint if it is per kind. Null if it is off, or if each constraint has its own value.
- * @param {Values | null} values @param {string} name @param {string} kind @returns {ParameterValue} */
-export function valueOf(values, name, kind) {
+/** A parameter, for one kind of constraint or one generated block if it has values for them. Null if it is off, or if each
+ * constraint or bend has its own value.
+ * @param {Values | null} values @param {string} name @param {string} part @returns {ParameterValue} */
+export function valueOf(values, name, part) {
+  const ofBlock = name === "bending" ? blockValues(values).find((one) => String(one.block) === part) : undefined;
+  if (ofBlock !== undefined) return toNumber(ofBlock.value);
   const value = values?.[name] ?? null;
   if (value === null || typeof value !== "object" || Array.isArray(value)) return typeof value === "string" ? toNumber(value) : value;
-  return value[kind] ?? null;
+  return value[part] ?? null;
 }
+
+/** The blocks with a `bending` of their own. @param {Values | null} values @returns {{ block: number, value: number | string }[]} */
+export const blockValues = (values) => /** @type {any} */ (values)?.bending_by_block ?? [];

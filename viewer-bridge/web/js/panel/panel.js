@@ -3,7 +3,7 @@
 
 import { KINDS } from "../state/quantity.js";
 import { find, make } from "../ui/dom.js";
-import { SLIDER_STEPS, editable, positionOf, rangeOf, restoring, rowsOf, valueAt, vectorOf } from "./parameters.js";
+import { SLIDER_STEPS, editable, partsOf, positionOf, rangeOf, restoring, rowsOf, unitOf, valueAt, vectorOf } from "./parameters.js";
 import { valueOf } from "../net/messages.js";
 import { unitIn } from "../ui/units.js";
 import { ValueField } from "./value-field.js";
@@ -35,7 +35,7 @@ export class Panel {
   }
 
   rows() {
-    return rowsOf(this.simulation.node?.method ?? null);
+    return rowsOf(this.simulation.node?.method ?? null, this.simulation.scene?.hasBends ?? false);
   }
 
   /** Rebuilds the rows for another scene or method; otherwise refreshes their values. */
@@ -69,8 +69,8 @@ export class Panel {
   /** Restores the parameters of the scene, and leaves its particles as they are. */
   reset() {
     const { changes, lost } = this.difference();
-    for (const { name, value, kind } of changes) this.set(name, value, kind);
-    if (lost.length > 0) this.banner.notify(`${lost.join(", ")}: each constraint had its own value. Reset the scene to restore them.`, "warning");
+    for (const { name, value, part } of changes) this.set(name, value, part);
+    if (lost.length > 0) this.banner.notify(`${lost.join(", ")}: each constraint or bend had its own value. Reset the scene to restore them.`, "warning");
   }
 
   /** The reason why nothing can be set now, or "". */
@@ -96,10 +96,10 @@ export class Panel {
     this.unsent.clear();
   }
 
-  /** @param {string} name @param {ParameterValue} value @param {string} [kind] */
-  set(name, value, kind) {
-    const forKind = kind === undefined || kind === "all" ? {} : { constraint_kind: kind };
-    this.unsent.set(`${name} ${kind ?? "all"}`, () => this.commands.run("set", { parameter: name, value, ...forKind }, (outcome) => {
+  /** @param {string} name @param {ParameterValue} value @param {string} [part] a kind of constraint, or a block */
+  set(name, value, part = "all") {
+    const field = KINDS.includes(part) ? { constraint_kind: part } : part === "all" ? {} : { block: Number(part) };
+    this.unsent.set(`${name} ${part}`, () => this.commands.run("set", { parameter: name, value, ...field }, (outcome) => {
       if (outcome.status !== "applied") this.update();
     }));
   }
@@ -163,27 +163,30 @@ export class Panel {
     return shell;
   }
 
-  /** A row with a slider and its value, a switch if the parameter can be off, and a choice of the constraint kind if it is per kind. @param {Row} row */
+  /** A row with a slider and its value, a switch if the parameter can be off, and a choice of the part if it has parts. @param {Row} row */
   numberRow(row) {
     const { simulation } = this;
     const slider = make("input", { type: "range", min: 0, max: SLIDER_STEPS, id: `set-${row.name}` });
-    const kinds = make("select", { "aria-label": `${row.label}: constraint kind` }, ...["all", ...KINDS].map((kind) => make("option", {}, kind)));
+    const shapes = simulation.scene?.shapes ?? [];
+    const parts = partsOf(row, shapes, KINDS);
+    const options = [{ part: "all", text: "all" }, ...parts].map(({ part, text }) => make("option", { value: part }, text));
+    const choice = make("select", { "aria-label": `${row.label}: ${row.parts === "blocks" ? "shape" : "constraint kind"}` }, ...options);
     const isOn = make("input", { type: "checkbox", "aria-label": `${row.label}: on` });
-    const kind = () => (row.perKind ? kinds.value : "all");
-    const read = (/** @type {"values" | "initial"} */ which) => valueOf(simulation.parameters?.[which] ?? null, row.name, kind() === "all" ? "structural" : kind());
+    const part = () => (parts.length > 0 ? choice.value : "all");
+    const read = (/** @type {"values" | "initial"} */ which) => valueOf(simulation.parameters?.[which] ?? null, row.name, part() === "all" ? "structural" : part());
     const numbers = () => [read("values"), read("initial")].filter((value) => typeof value === "number");
     const range = () => rangeOf(row, .../** @type {number[]} */ (numbers()));
-    const send = (/** @type {ParameterValue} */ value) => this.set(row.name, value, row.perKind ? kind() : undefined);
+    const send = (/** @type {ParameterValue} */ value) => this.set(row.name, value, part());
     const field = this.valueField(row, `${row.label}${row.unit === "" ? "" : ` in ${this.unit(row)}`}`, send);
     const button = this.undoButton(row, () => send(read("initial")));
     const title = make("span", { class: "title" }, ...(row.canBeOff ? [isOn] : []), make("label", { for: slider.id }, row.label));
     const unit = make("span", { class: "unit" }, this.unit(row));
-    const shell = make("fieldset", { class: "row" }, title, row.perKind ? kinds : slider, field.input, unit, button, ...(row.perKind ? [slider] : []));
-    slider.classList.toggle("all", row.perKind ?? false);
+    const shell = make("fieldset", { class: "row" }, title, parts.length > 0 ? choice : slider, field.input, unit, button, ...(parts.length > 0 ? [slider] : []));
+    slider.classList.toggle("all", parts.length > 0);
     const showValue = (/** @type {ParameterValue} */ value) => {
       const isOff = typeof value !== "number" || (row.canBeOff && value === 0 && row.least === 0);
-      // Each constraint can have its own value.
-      field.show(isOff ? null : value, row.perKind ? "own" : "off");
+      // Each constraint or bend can have its own value.
+      field.show(isOff ? null : value, row.parts === undefined ? "off" : "own");
       this.describe(slider, row, isOff ? null : value);
     };
     slider.addEventListener("input", () => {
@@ -193,8 +196,9 @@ export class Panel {
       send(value);
     });
     isOn.addEventListener("change", () => send(isOn.checked ? row.whenOn ?? row.least : null));
-    kinds.addEventListener("change", () => this.update());
+    choice.addEventListener("change", () => this.update());
     this.refreshers.push(() => {
+      unit.textContent = this.unit(row, part());
       const value = read("values");
       if (!slider.matches(":active")) slider.valueAsNumber = positionOf(row, range(), typeof value === "number" ? value : row.whenOn ?? row.least);
       // A value of 0 has the same effect as off.
@@ -206,8 +210,9 @@ export class Panel {
     return shell;
   }
 
-  /** The unit of a row, with the length unit of the scene in place of metres. @param {Row} row */
-  unit(row) {
-    return unitIn(row.unit, this.simulation.scene?.unit ?? "m");
+  /** The unit of a row for a part, with the length unit of the scene in place of metres. @param {Row} row @param {string} [part] */
+  unit(row, part = "all") {
+    const { scene } = this.simulation;
+    return unitIn(unitOf(row, scene?.shapes ?? [], part), scene?.unit ?? "m");
   }
 }

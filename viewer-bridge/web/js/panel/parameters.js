@@ -2,16 +2,17 @@
 // No DOM here.
 
 import { niceCeiling } from "../geometry/round.js";
-import { toNumber, valueOf } from "../net/messages.js";
+import { blockValues, toNumber, valueOf } from "../net/messages.js";
 
 /** @typedef {import("../net/messages.js").Values} Values */
 /** @typedef {import("../net/messages.js").ParameterValue} ParameterValue */
 /**
  * A row of the panel. A "log" slider is logarithmic, and starts with 0 if `hasZero`. `whenOn` is the value
- * of a parameter when it is switched on.
+ * of a parameter when it is switched on. A row with `parts` has a value for all constraints or bends, or for those of a part: a
+ * kind of constraint, or a generated block with bends. Without a value, each has its own.
  * @typedef {{
  *   name: string, label: string, unit: string, kind: "vector" | "linear" | "log" | "whole",
- *   least: number, most: number, canBeOff?: boolean, hasZero?: boolean, whenOn?: number, method?: "xpbd" | "pbd", perKind?: boolean,
+ *   least: number, most: number, canBeOff?: boolean, hasZero?: boolean, whenOn?: number, method?: "xpbd" | "pbd", parts?: "kinds" | "blocks",
  * }} Row
  */
 
@@ -24,8 +25,9 @@ export const ROWS = [
   { name: "wind_velocity", label: "Wind", unit: "m/s", kind: "vector", least: -20, most: 20 },
   { name: "wind_drag", label: "Wind drag", unit: "kg/m³", kind: "linear", least: 0, most: 2, canBeOff: true, whenOn: 0.6 },
   { name: "damping", label: "Damping", unit: "1/s", kind: "linear", least: 0, most: 5 },
-  { name: "compliance", label: "Compliance", unit: "m/N", kind: "log", least: 1e-8, most: 10, hasZero: true, method: "xpbd", perKind: true },
-  { name: "stiffness", label: "Stiffness", unit: "", kind: "linear", least: 0, most: 1, method: "pbd", perKind: true },
+  { name: "compliance", label: "Compliance", unit: "m/N", kind: "log", least: 1e-8, most: 10, hasZero: true, method: "xpbd", parts: "kinds" },
+  { name: "stiffness", label: "Stiffness", unit: "", kind: "linear", least: 0, most: 1, method: "pbd", parts: "kinds" },
+  { name: "bending", label: "Bending", unit: "N m", kind: "log", least: 1e-7, most: 10, hasZero: true, parts: "blocks" },
   { name: "iterations", label: "Iterations", unit: "", kind: "whole", least: 1, most: 32 },
   { name: "substeps", label: "Substeps", unit: "", kind: "whole", least: 1, most: 32 },
   { name: "tear_force", label: "Tear force", unit: "N", kind: "log", least: 1e-3, most: 1e5, canBeOff: true, whenOn: 50 },
@@ -36,8 +38,21 @@ export const ROWS = [
   { name: "time_scale", label: "Speed", unit: "×", kind: "log", least: 0.01, most: 10 },
 ];
 
-/** The rows for a method. @param {string | null} method */
-export const rowsOf = (method) => ROWS.filter((row) => row.method === undefined || row.method === (method ?? "xpbd"));
+/** The rows for a method; one about bends only if the scene has some. @param {string | null} method @param {boolean} hasBends */
+export const rowsOf = (method, hasBends) =>
+  ROWS.filter((row) => (row.method === undefined || row.method === (method ?? "xpbd")) && (hasBends || row.parts !== "blocks"));
+
+/**
+ * The parts of a row, with the texts that name them: none if a value for all says the same.
+ * @param {Row} row @param {{ shape: string, has_bends?: boolean }[]} shapes of the scene @param {string[]} kinds of constraints
+ * @returns {{ part: string, text: string }[]}
+ */
+export function partsOf(row, shapes, kinds) {
+  if (row.parts === "kinds") return kinds.map((part) => ({ part, text: part }));
+  if (row.parts === undefined) return [];
+  const blocks = shapes.flatMap((shape, block) => (shape.has_bends ? [{ part: String(block), text: `${block} ${shape.shape}` }] : []));
+  return blocks.length > 1 ? blocks : [];
+}
 
 /** The range of a row, wide enough for the initial and current values of the scene. @param {Row} row @param {...number} values */
 export function rangeOf(row, ...values) {
@@ -91,22 +106,31 @@ export function typedValue(row, text) {
   return row.kind === "whole" && !Number.isInteger(value) ? undefined : value;
 }
 
+/** The unit of a row for a part, in metres: on a line, such as a rope, a rigidity has another one than on a surface.
+ * @param {Row} row @param {{ shape: string, has_bends?: boolean }[]} shapes of the scene @param {string} part */
+export function unitOf(row, shapes, part) {
+  if (row.parts !== "blocks") return row.unit;
+  const bent = part === "all" ? shapes.filter((shape) => shape.has_bends) : [shapes[Number(part)]];
+  return bent.length > 0 && bent.every((shape) => shape?.shape === "rope") ? "N m²" : row.unit;
+}
+
 /**
  * The commands that restore the parameters of the scene, and the labels of rows that no command restores:
- * "set" cannot give each constraint its own value back.
+ * "set" cannot give each constraint or bend its own value back.
  * @param {Row[]} rows @param {Values} values @param {Values} initial @param {string[]} kinds of constraints
  */
 export function restoring(rows, values, initial, kinds) {
-  /** @type {{ name: string, value: ParameterValue, kind?: string }[]} */
+  /** @type {{ name: string, value: ParameterValue, part?: string }[]} */
   const changes = [];
   /** @type {string[]} */
   const lost = [];
   for (const row of rows) {
-    for (const kind of row.perKind ? kinds : [undefined]) {
-      const [now, first] = [values, initial].map((one) => valueOf(one, row.name, kind ?? ""));
+    const blocks = row.parts === "blocks" ? blockValues(values).map((one) => String(one.block)) : [];
+    for (const part of row.parts === "kinds" ? kinds : [undefined, ...blocks]) {
+      const [now, first] = [values, initial].map((one) => valueOf(one, row.name, part ?? ""));
       if (String(now) === String(first)) continue;
-      if (first === null && row.perKind) lost.push(row.label);
-      else changes.push({ name: row.name, value: first, ...(kind === undefined ? {} : { kind }) });
+      if (first === null && row.parts !== undefined) lost.push(row.label);
+      else changes.push({ name: row.name, value: first, ...(part === undefined ? {} : { part }) });
     }
   }
   return { changes, lost: [...new Set(lost)] };

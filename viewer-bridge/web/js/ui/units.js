@@ -15,11 +15,12 @@ export function unitsOf(length) {
   };
 }
 
-/** A unit given for metres, in another unit of length. @param {string} unit "m/s²", "kg/m³", "N" or "m/N" @param {string} length */
+/** A unit given for metres, in another unit of length. @param {string} unit "m/s²", "kg/m³", "N", "N m" or "m/N" @param {string} length */
 export function unitIn(unit, length) {
   if (length === "m") return unit;
   const units = unitsOf(length);
   if (unit === "N") return units.force;
+  if (unit.startsWith("N m")) return unit.replace("N m", `${units.force} ${length}`);
   return unit === "m/N" ? units.compliance : unit.replace(/\bm(?=$|\/|³)/, length);
 }
 
