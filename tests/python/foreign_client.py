@@ -13,6 +13,7 @@ import iceoryx2 as iox2
 NUMBERS = {
     "u8": ctypes.c_uint8,
     "u32": ctypes.c_uint32,
+    "i32": ctypes.c_int32,
     "u64": ctypes.c_uint64,
     "f32": ctypes.c_float,
     "f64": ctypes.c_double,

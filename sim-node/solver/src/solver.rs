@@ -405,11 +405,6 @@ impl Solver {
         self.model.bends.len()
     }
 
-    /// Returns the number of generated blocks.
-    pub fn block_count(&self) -> usize {
-        self.model.bent_blocks.len()
-    }
-
     /// Returns the bends by index, as loaded. Bends have indices of their own, and never tear.
     pub fn bends(&self) -> impl Iterator<Item = Bend> + '_ {
         self.model.bends.iter().copied()

@@ -198,7 +198,7 @@ impl Solver {
         let (fixed, grab) = (index + 4, index + 10 + 12 + 5);
         let (torn, cause, moved) = (link, 1, 5 + 12 + 16);
         let (root, basis) = if self.settings.has_tethers() { (index, link) } else { (0, 0) };
-        let parameters = 2 * 12 + 4 * 4 + 2 * 5 + 9 * 5 + 10 + self.block_count() * 5;
+        let parameters = 2 * 12 + 4 * 4 + 2 * 5 + 9 * 5 + 10 + self.model.bent_blocks.len() * 5;
         let head = 4 + 1 + 10 + 8 * 10 + parameters;
         head + self.particle_count() * (fixed + grab + root)
             + self.constraint_count() * (torn + cause + basis)
