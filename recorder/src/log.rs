@@ -44,6 +44,7 @@ pub use rows::{
     OutcomeRow, ParametersRow, ShapeRow, Softness, StatusRow, StepRow, SurfaceRow, TearsRow,
     TopologyRow, bend_state, constraint_state,
 };
+pub(crate) use run::BENDS_VERSION;
 pub use run::selection::ContentSelection;
 pub use run::{CLOSING_METADATA, Closing, FORMAT_VERSION, RunDescription, SCENE_ATTACHMENT};
 pub use state_hash::state_hash;

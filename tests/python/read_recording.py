@@ -35,6 +35,7 @@ def main(recording, published):
         metadata = {record.name: record.metadata for record in reader.iter_metadata()}
         assert list(metadata) == ["run", "recorder"], metadata
         assert metadata["run"]["format_version"] == "6", metadata
+        assert metadata["run"]["bend_count"] == "0", metadata
         last_log_time, cloud_times, validators = 0, [], {}
         for schema, channel, message in reader.iter_messages(log_time_order=False):
             counts[channel.topic] = counts.get(channel.topic, 0) + 1

@@ -206,12 +206,18 @@ fn action(held: &HeldState, rng: &mut Rng) -> Action {
 /// Returns an action that every node rejects.
 fn bad_action(held: &HeldState, rng: &mut Rng) -> Action {
     let (target, over_s) = ([f32::NAN, 0.0, f32::INFINITY], 0.05);
-    match rng.u32(0..7) {
+    match rng.u32(0..8) {
         0 => Action::Pin { particle: rng.u32(held.particle_count()..) },
         1 => Action::Cut { constraint: rng.u32(ELEMENTS_MAX..) },
         2 => Action::Grab { particle: 90, target, over_s },
         3 => Action::CutRadius { center: target, radius: 0.05 },
         4 => set("substeps", 0.5),
+        6 => Action::Set {
+            parameter: Text::cut("bending"),
+            value: ParameterValue::Number(0.1),
+            constraint_kind: None,
+            block: Some(rng.u32(1000..)),
+        },
         5 => Action::Rewind { to_step: Some(u64::MAX >> 12), back_steps: None },
         // A command alone has no state.
         _ => Action::Restore { contents: RestoreContents::State, state_hash: rng.u64(..) },

@@ -137,7 +137,8 @@ fn lost_load(report: &RepairReport) -> Option<LoadRows> {
     let constraints: Vec<_> = solver.constraints().map(constraint_state).collect();
     let triangles: Vec<_> =
         solver.triangles().iter().map(|corners| Triangle { corners: *corners }).collect();
-    let bends: Vec<_> = solver.bends().map(bend_state).collect();
+    let bends = solver.bends().filter(|_| lost.has_bends);
+    let bends: Vec<_> = bends.map(bend_state).collect();
     let topology = TopologyRow::new(&header, &constraints, &bends);
     Some(LoadRows {
         topology: TopologyRow { torn: lost.torn.clone(), ..topology },

@@ -35,6 +35,7 @@ use chunk::{LocatedChunk, record_size_bytes};
 #[derive(Debug)]
 pub struct IndexedLog {
     file: File,
+    format_version: u32,
     run: RunDescription,
     scene: Vec<u8>,
     limits: SizeLimits,
@@ -99,7 +100,7 @@ impl IndexedLog {
         let log = LogReader::open_file(path, stop.cloned())?;
         log.selection().require(&ContentSelection::FOR_PICTURES, "a reader of single steps")?;
         log.selection().require_all_particles("a reader of single steps")?;
-        let limits = log.limits();
+        let (limits, format_version) = (log.limits(), log.format_version());
         let (run, scene) = (log.run().clone(), log.scene().to_vec());
         let file = open_regular_file(path)?;
         let size_bytes = file.metadata()?.len();
@@ -111,7 +112,18 @@ impl IndexedLog {
         };
         let channels = BTreeMap::new();
         let (stop, chunks) = (stop.cloned(), Vec::new());
-        let mut log = Self { file, run, scene, limits, stop, channels, chunks, end, has_index };
+        let mut log = Self {
+            file,
+            format_version,
+            run,
+            scene,
+            limits,
+            stop,
+            channels,
+            chunks,
+            end,
+            has_index,
+        };
         log.resolve_topics(&located)?;
         Ok(log)
     }
@@ -157,6 +169,7 @@ impl IndexedLog {
     pub fn try_clone(&self) -> Result<Self, ReadError> {
         Ok(Self {
             file: self.file.try_clone()?,
+            format_version: self.format_version,
             run: self.run.clone(),
             scene: self.scene.clone(),
             limits: self.limits,
@@ -166,6 +179,11 @@ impl IndexedLog {
             end: self.end.clone(),
             has_index: self.has_index,
         })
+    }
+
+    /// Returns the version of the format of the file.
+    pub fn format_version(&self) -> u32 {
+        self.format_version
     }
 
     /// Returns the run that was recorded.

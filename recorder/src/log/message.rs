@@ -108,7 +108,8 @@ impl Message {
             Self::Outcome(row) => row.status.len() + row.reason.len(),
             Self::Status(row) => row.scene_name.len(),
             Self::Event(row) => row.kind.len() + row.text.len(),
-            Self::Parameters(_) | Self::Step(_) => 0,
+            Self::Parameters(row) => size_of_val(row.values.bending_by_block.as_slice()),
+            Self::Step(_) => 0,
         };
         size_of::<Self>() + heap_size_bytes
     }

@@ -21,6 +21,8 @@ use super::topic::{AllCounts, Topic, TopicCounts};
 /// snapshot a time of reception of its own, and has schemas that Foxglove viewers accept. Version 6 added the
 /// bends in `/topology`, and their number.
 pub const FORMAT_VERSION: u32 = 6;
+/// First version that lists the bends.
+pub(crate) const BENDS_VERSION: u32 = 6;
 /// Oldest version that this recorder reads. Missing fields have defaults.
 pub(super) const FORMAT_VERSION_MIN: u32 = 1;
 

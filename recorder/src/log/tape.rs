@@ -9,16 +9,17 @@ mod search;
 use std::path::Path;
 use std::sync::Arc;
 
-use sim_contract::{ParticleState, Stop, Torn};
+use sim_contract::{BendState, ParticleState, Stop, Torn};
+use sim_solver::{Scene, Solver};
 
 use super::index::IndexedLog;
 use super::read::file_source::FileSource;
 use super::read::frames::FrameReader;
 use super::read::read_error::{LogEnd, ReadError};
 use super::rows::{
-    CollidersRow, ForcesRow, ParametersRow, StatusRow, StepRow, SurfaceRow, TopologyRow,
+    CollidersRow, ForcesRow, ParametersRow, StatusRow, StepRow, SurfaceRow, TopologyRow, bend_state,
 };
-use super::run::RunDescription;
+use super::run::{BENDS_VERSION, RunDescription, SCENE_ATTACHMENT};
 use super::tears::TearTracker;
 use super::topic::Topic;
 use chunk_reader::ChunkReader;
@@ -126,6 +127,21 @@ impl Tape {
     /// Returns the constraints.
     pub fn topology(&self) -> &TopologyRow {
         &self.topology
+    }
+
+    /// Returns the bends, or `None` if their columns differ in length. A recording of an older format does not
+    /// list them; then they are those of its scene.
+    pub fn bends(&self) -> Option<Vec<BendState>> {
+        if self.log().format_version() >= BENDS_VERSION {
+            return self.topology.bends();
+        }
+        let text = std::str::from_utf8(self.log().scene()).ok();
+        let scene = text.and_then(|text| Scene::from_toml(text, SCENE_ATTACHMENT).ok());
+        Some(
+            scene.map_or_else(Vec::new, |scene| {
+                Solver::new(&scene).bends().map(bend_state).collect()
+            }),
+        )
     }
 
     /// Returns the triangles.

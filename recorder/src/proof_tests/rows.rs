@@ -2,7 +2,7 @@
 //! simulation, and a changed row is reported.
 
 use crate::log::{BendColumns, Message, TearsRow, TopologyRow};
-use sim_contract::ParticleFlags;
+use sim_contract::{BlockValue, ParticleFlags};
 
 use super::commands::{COMMANDS, SCENE, STEPS, collect, job, job_of};
 use super::{check, rebuild, record};
@@ -255,4 +255,31 @@ fn parameters_are_recorded_at_the_start_and_after_each_change() {
     let (report, _) = check(&changed);
     assert_eq!((report.verdict, report.step), (Verdict::Diverged, Some(32)), "{report}");
     assert!(report.to_string().contains("parameter damping: recorded"), "{report}");
+}
+
+#[test]
+fn the_bending_of_a_block_that_the_simulation_has_not_is_found() {
+    let (file, _) = record(&job(COMMANDS));
+    let with_blocks = |blocks: &[BlockValue]| {
+        let changed = rebuild(&file, |message| match message {
+            Message::Parameters(mut row) if row.step == 54 => {
+                assert_eq!(row.values.bending_by_block, [BlockValue { block: 0, value: 0.03 }]);
+                row.values.bending_by_block = blocks.to_vec();
+                Some(Message::Parameters(row))
+            }
+            other => Some(other),
+        });
+        check(&changed).0
+    };
+    let of = |block, value| BlockValue { block, value };
+    for (blocks, text) in [
+        (&[][..], "bending of block 0: recorded none, simulated Number(0.03)"),
+        (&[of(0, 0.04)], "bending of block 0: recorded Number(0.04), simulated Number(0.03)"),
+        (&[of(0, 0.03), of(1, 0.1)], "bending of block 1: recorded Number(0.1), simulated none"),
+    ] {
+        let report = with_blocks(blocks);
+        assert_eq!((report.verdict, report.step), (Verdict::Diverged, Some(54)), "{report}");
+        assert!(report.to_string().contains(text), "{report}");
+    }
+    assert_eq!(with_blocks(&[of(0, 0.03)]).verdict, Verdict::Identical);
 }

@@ -6,13 +6,12 @@ use sim_contract::{LoadHeader, Triangle};
 use sim_solver::{Scene, Solver};
 
 use crate::log::{
-    LogReader, Message, RunDescription, SurfaceRow, TopologyRow, bend_state, constraint_state,
+    BENDS_VERSION, LogReader, Message, RunDescription, SurfaceRow, TopologyRow, bend_state,
+    constraint_state,
 };
 
 /// First version of the format that says which axis of the scene points up.
 const TURNED_VERSION: u32 = 5;
-/// First version of the format that has the bends.
-const BENDS_VERSION: u32 = 6;
 
 /// Compares the metadata of the run with the scene. Returns a description of the first difference.
 pub(super) fn compare_run<R: Read>(log: &LogReader<R>, scene: &Scene) -> Option<String> {
@@ -105,8 +104,10 @@ fn compare_topology(
     let Some(found) = row.bends() else {
         return Some("/topology: the columns of its bends differ in length".to_owned());
     };
-    let place = first_difference(&found, &bends).unwrap_or_default();
-    Some(format!("/topology: bend {place} is not that of the scene"))
+    Some(match first_difference(&found, &bends) {
+        Some(place) => format!("/topology: bend {place} is not that of the scene"),
+        None => "/topology: it has another column of softness than the scene".to_owned(),
+    })
 }
 
 /// Returns the first place where two lists differ.

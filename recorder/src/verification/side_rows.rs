@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, VecDeque};
 
 use crate::log::{CollidersRow, EventRow, ForcesRow, Message, ParametersRow, TearsRow};
-use sim_contract::{ForceKind, ForceRow, ParameterValues, ParticleFlags, ParticleState};
+use sim_contract::{ForceKind, ForceRow, ParameterValues, ParticleFlags, ParticleState, Setting};
 use sim_solver::{Keyframe, Solver};
 
 use crate::simulation::solver_rows::{colliders_row, forces_row, newest_tears_row};
@@ -255,13 +255,15 @@ fn tear_text(row: &TearsRow, place: usize) -> String {
 fn compare_parameters(recorded: &ParametersRow, solver: &Solver) -> Option<String> {
     let time_scale = recorded.values.time_scale;
     let simulated = ParameterValues { time_scale, ..solver.parameter_values() };
-    let settings = recorded.values.settings().into_iter().zip(simulated.settings());
-    let (old, new) = settings.into_iter().find(|(old, new)| old != new)?;
-    let name = old.parameter.name();
-    Some(format!(
-        "/parameters: parameter {name}: recorded {:?}, simulated {:?}",
-        old.value, new.value
-    ))
+    let (old, new) = (recorded.values.settings(), simulated.settings());
+    let place = (0..old.len().max(new.len())).find(|place| old.get(*place) != new.get(*place))?;
+    let setting = old.get(place).or_else(|| new.get(place))?;
+    let block = setting.block.map_or_else(String::new, |block| format!(" of block {block}"));
+    let value = |settings: &[Setting]| {
+        settings.get(place).map_or_else(|| "none".to_owned(), |one| format!("{:?}", one.value))
+    };
+    let (name, old, new) = (setting.parameter.name(), value(&old), value(&new));
+    Some(format!("/parameters: parameter {name}{block}: recorded {old}, simulated {new}"))
 }
 
 /// Compares the impulses of a step.

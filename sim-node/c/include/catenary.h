@@ -43,6 +43,7 @@
 #define CATENARY_OPTION_BACK 128  // a rewind has a number of steps
 #define CATENARY_OPTION_STATE 256  // a restore has a complete state
 #define CATENARY_OPTION_MOTION 512  // a restore has positions and velocities
+#define CATENARY_OPTION_BLOCK 1024  // a set is for one generated block
 
 
 // Result of a call. `catenary_last_error` describes every other result than `CATENARY_OK`.
@@ -337,7 +338,7 @@ typedef struct catenary_client catenary_client;
 typedef struct {
   // Number of the action in the table above.
   uint32_t kind;
-  // Index of the particle, constraint, anchor, collider or, if `CommandOptions::BLOCK` is set, generated
+  // Index of the particle, constraint, anchor, collider or, if `CATENARY_OPTION_BLOCK` is set, generated
   // block.
   uint32_t index;
   // Random number of the sender, below 2^53 (exact in JSON); `CONSOLE_CLIENT_ID` is the console.
@@ -504,8 +505,9 @@ typedef struct {
 // change until the next load, and never tears; it stops acting once a constraint of its path is torn.
 //
 // With C the sum of c x over its particles, its energy in J is |C - rest n|^2 / (2 alpha), where
-// alpha = `geometry` / rigidity is its compliance in m/N, and n the unit vector along the sum of the unit
-// normals of the two triangles of a hinge. `set bending` replaces the rigidity.
+// alpha = `geometry` / rigidity is its compliance in m/N. For the positions p0 to p3 of a hinge, n is the unit
+// vector along the sum of the unit normals of its triangles, along (p2 - p1) x (p0 - p1) and
+// (p3 - p1) x (p2 - p1). `set bending` replaces the rigidity.
 typedef struct {
   // Indices of the particles. The fourth of a bend of three is its second one again.
   uint32_t particles[4];
@@ -600,13 +602,13 @@ typedef struct {
 
 // The value of one parameter: 28 bytes, alignment 4; an element of `parameters`. A parameter with a
 // value for each kind of constraint has one element for each kind. `bending` has one element for all bends,
-// and after it one for each generated block with another value.
+// and after all parameters one for each generated block with a value of its own.
 typedef struct {
   // A `catenary_parameter` as a number.
   uint32_t parameter;
   // A `catenary_constraint_kind` as a number, for a parameter with a value for each kind; else 0.
   uint32_t constraint_kind;
-  // Index of a generated block, for its `bending`; else -1.
+  // Index of a generated block, for its `bending`; else -1, because 0 is a block.
   int32_t block;
   // Form of the value: 0 is off, 1 a number, 2 three numbers.
   uint32_t form;
@@ -973,7 +975,8 @@ catenary_command catenary_command_set_off(const char *parameter);
 catenary_command catenary_command_for_kind(catenary_command set, uint32_t constraint_kind);
 
 // Returns a command that sets "bending", for the bends of one generated block only: the index of the
-// `[[generate]]` block in the scene. Any other command is returned unchanged.
+// `[[generate]]` block in the scene. A node rejects a block for another parameter. Any command other than a set is
+// returned unchanged.
 catenary_command catenary_command_for_block(catenary_command set,
                                             uint32_t block);
 

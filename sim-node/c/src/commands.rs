@@ -244,7 +244,8 @@ pub extern "C" fn catenary_command_for_kind(set: Command, constraint_kind: u32) 
 }
 
 /// Returns a command that sets "bending", for the bends of one generated block only: the index of the
-/// `[[generate]]` block in the scene. Any other command is returned unchanged.
+/// `[[generate]]` block in the scene. A node rejects a block for another parameter. Any command other than a set is
+/// returned unchanged.
 #[unsafe(no_mangle)]
 pub extern "C" fn catenary_command_for_block(set: Command, block: u32) -> Command {
     match set.action() {

@@ -6,7 +6,7 @@ pub(crate) mod plan;
 pub(crate) mod preparation;
 
 use glam::Vec3;
-use sim_types::{ConstraintKind, ParameterValue, ParticleFlags, Reason};
+use sim_types::{ConstraintKind, Parameter, ParameterValue, ParticleFlags, Reason};
 
 use crate::checks::{check_finite, is_near};
 use crate::contacts::bodies::driven_body::BodyMotion;
@@ -233,16 +233,12 @@ impl Solver {
         self.set_for(name, value, kind.map_or(Target::All, Target::Kind))
     }
 
-    /// Sets `bending` for the bends of a generated block, from the next step on, as [`Self::set`] does for all.
+    /// Sets the `bending` of a generated block in N m, N m^2 for a rope, from the next step on.
     ///
     /// # Errors
-    /// Same as [`Self::set`]; or there is no such block, or it has no bends.
-    pub fn set_for_block(
-        &mut self,
-        name: &str,
-        value: ParameterValue,
-        block: u32,
-    ) -> Result<(), Reason> {
+    /// The value is out of range, there is no such block, or it has no bends.
+    pub fn set_block_bending(&mut self, block: u32, bending: f32) -> Result<(), Reason> {
+        let (name, value) = (Parameter::Bending.name(), ParameterValue::Number(bending));
         self.set_for(name, value, Target::Block(block))
     }
 

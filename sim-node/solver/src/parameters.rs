@@ -1,5 +1,7 @@
 //! The parameters that can change while a scene runs.
 
+pub(crate) mod block_bending;
+
 use serde::{Deserialize, Serialize};
 use sim_types::{
     BlockValue, ConstraintKind, KindFilter, Method, OffMeaning, Parameter, ParameterInfo,
@@ -11,6 +13,7 @@ use crate::constraints::bends::Bend;
 use crate::scene::definition::Scene;
 use crate::scene::definition::limits::Limits;
 use crate::scene::definition::wind::Wind;
+use block_bending::BlockBending;
 
 /// Values that can change while a scene runs. Part of the state, and of a keyframe.
 #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -34,8 +37,10 @@ pub(crate) struct Parameters {
     softness: [Option<f32>; 4],
     /// Rigidity that replaces that of every bend.
     bending: Option<f32>,
-    /// By generated block: rigidity that replaces that of its bends, also if `bending` has a value.
-    block_bending: Vec<Option<f32>>,
+    /// The bending of blocks that have one of their own, also if `bending` has a value. A keyframe has it behind
+    /// its other fields, because older keyframes end there.
+    #[serde(skip)]
+    pub(crate) block_bending: BlockBending,
 }
 
 impl Clone for Parameters {
@@ -125,7 +130,7 @@ impl Parameters {
             tear_force: limits.tear_force,
             softness: [None; 4],
             bending: None,
-            block_bending: vec![None; scene.generators.len()],
+            block_bending: BlockBending::with_room_for(scene.generators.len()),
         }
     }
 
@@ -142,7 +147,7 @@ impl Parameters {
 
     /// Rigidity of a bend.
     pub(crate) fn rigidity(&self, bend: &Bend) -> f32 {
-        let of_block = bend.block.and_then(|block| self.block_bending[block as usize]);
+        let of_block = bend.block.and_then(|block| self.block_bending.get(block));
         of_block.or(self.bending).unwrap_or(bend.rigidity)
     }
 
@@ -208,9 +213,8 @@ impl Parameters {
 
     /// Returns true if every bend has the same rigidity as with `other`.
     fn has_bending_of(&self, other: &Self) -> bool {
-        let bits = |rigidity: &Option<f32>| rigidity.map(f32::to_bits);
-        bits(&self.bending) == bits(&other.bending)
-            && self.block_bending.iter().map(bits).eq(other.block_bending.iter().map(bits))
+        self.bending.map(f32::to_bits) == other.bending.map(f32::to_bits)
+            && self.block_bending == other.block_bending
     }
 
     fn softness_bits(&self) -> [Option<u32>; 4] {
@@ -275,10 +279,10 @@ impl Parameters {
                 Target::All | Target::Block(_) => self.softness = [number; 4],
             },
             Parameter::Bending => match target {
-                Target::Block(block) => self.block_bending[block as usize] = number,
+                Target::Block(block) => self.block_bending.set(block, number),
                 Target::All | Target::Kind(_) => {
                     self.bending = number;
-                    self.block_bending.fill(None);
+                    self.block_bending.clear();
                 }
             },
             // The pace belongs to the node. It is checked here, so that every program refuses the
@@ -314,9 +318,10 @@ impl Parameters {
             compliance,
             stiffness,
             bending: self.bending,
-            bending_by_block: (0..)
-                .zip(&self.block_bending)
-                .filter_map(|(block, value)| Some(BlockValue { block, value: (*value)? }))
+            bending_by_block: self
+                .block_bending
+                .iter()
+                .map(|(block, value)| BlockValue { block, value })
                 .collect(),
         }
     }
@@ -333,12 +338,10 @@ impl Parameters {
                 || (check_finite(setting.value).is_ok()
                     && check_value(info, setting.value, context).is_ok())
         });
-        let are_blocks_valid = self.block_bending.len() == context.bent_blocks.len()
-            && self
-                .block_bending
-                .iter()
-                .zip(context.bent_blocks)
-                .all(|(rigidity, is_bent)| rigidity.is_none() || *is_bent);
+        let are_blocks_valid = self
+            .block_bending
+            .iter()
+            .all(|(block, _)| Target::Block(block).check(Parameter::Bending, context).is_ok());
         are_valid && are_blocks_valid && context.size.allows(self.substeps, self.iterations)
     }
 }

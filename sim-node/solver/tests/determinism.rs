@@ -92,9 +92,7 @@ fn apply(solver: &mut Solver, command: &RandomCommand) {
             let (name, low, high) = SETTINGS[which];
             solver.set(name, ParameterValue::Number(low + share * (high - low)), None)
         }
-        RandomCommand::SetBlock(block, value) => {
-            solver.set_for_block("bending", ParameterValue::Number(value), block)
-        }
+        RandomCommand::SetBlock(block, value) => solver.set_block_bending(block, value),
         RandomCommand::Reset => {
             solver.reset();
             Ok(())

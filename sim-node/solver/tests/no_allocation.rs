@@ -114,7 +114,7 @@ fn a_change_of_a_parameter_in_use_allocates_nothing() {
             }
         }
         for value in [0.02, 0.03] {
-            let set = solver.set_for_block("bending", ParameterValue::Number(value), 0);
+            let set = solver.set_block_bending(0, value);
             assert_eq!(set.is_ok(), has_bends);
             solver.finish_boundary();
             solver.step();

@@ -142,7 +142,9 @@ fn fixed_remedy(action: &Action, reason: Reason) -> Option<String> {
 /// Condition under which a command has an effect.
 fn missing_condition(action: &Action) -> Option<&'static str> {
     Some(match action {
-        Action::Set { block: Some(_), .. } => {
+        Action::Set { parameter, block: Some(_), .. }
+            if parameter.as_str() == Parameter::Bending.name() =>
+        {
             "the block has no bends; a generated cloth, rope or mesh has them with the key bending"
         }
         Action::Set { parameter, .. } if parameter.as_str() == Parameter::Bending.name() => {

@@ -61,7 +61,7 @@ pub struct ParameterValues {
     /// Older recordings lack it.
     #[serde(default, with = "optional_number")]
     pub bending: Option<f32>,
-    /// Blocks with another `bending`, ascending. Older recordings lack it.
+    /// Blocks with a `bending` of their own, ascending. Older recordings lack it.
     #[serde(default)]
     pub bending_by_block: Vec<BlockValue>,
 }

@@ -62,6 +62,7 @@ fn run() -> RunDescription {
         method: 1,
         particle_count: PARTICLE_COUNT,
         constraint_count: CONSTRAINT_COUNT,
+        bend_count: 0,
         solver_version: 1,
         contract_version: 1,
         recorder_version: "0.1.0".to_owned(),

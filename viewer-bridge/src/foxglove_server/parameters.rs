@@ -25,16 +25,17 @@ pub(super) fn list(values: &ParameterValues) -> Vec<NamedValue> {
 }
 
 /// Lists the values of one parameter: one, or one for all kinds of constraints and one for each; of `bending`,
-/// one for all bends, and one for each block with another value.
+/// one for all bends, and one for each block with a value of its own.
 fn named_values(parameter: Parameter, values: &ParameterValues) -> Vec<NamedValue> {
     let info = parameter.info();
     if !info.is_per_kind {
         let mut list = vec![named(info.name, info, values.get(parameter, None))];
         if parameter == Parameter::Bending {
-            list.extend(values.bending_by_block.iter().map(|one| {
-                let name = format!("{}.{}", info.name, one.block);
-                named(&name, info, ParameterValue::Number(one.value))
-            }));
+            list.extend(
+                values.bending_by_block.iter().map(|one| {
+                    named(&block_name(one.block), info, ParameterValue::Number(one.value))
+                }),
+            );
         }
         return list;
     }
@@ -49,6 +50,24 @@ fn named_values(parameter: Parameter, values: &ParameterValues) -> Vec<NamedValu
             .map(|(kind, value)| named(&format!("{}.{}", info.name, kind.name()), info, value)),
     );
     list
+}
+
+/// Returns the blocks of `old` that have no bending of their own any more, with that of all bends.
+pub(super) fn ended_blocks(old: &[NamedValue], new: &ParameterValues) -> Vec<NamedValue> {
+    let info = Parameter::Bending.info();
+    let is_listed =
+        |name: &str| new.bending_by_block.iter().any(|one| block_name(one.block) == name);
+    let ended = old.iter().map(|one| one.name.as_str());
+    let ended = ended.filter(|name| is_block_name(name) && !is_listed(name));
+    ended.map(|name| named(name, info, new.get(Parameter::Bending, None))).collect()
+}
+
+fn block_name(block: u32) -> String {
+    format!("{}.{block}", Parameter::Bending.name())
+}
+
+fn is_block_name(name: &str) -> bool {
+    name.split_once('.').is_some_and(|(name, _)| name == Parameter::Bending.name())
 }
 
 fn named(name: &str, info: &ParameterInfo, value: ParameterValue) -> NamedValue {
@@ -162,6 +181,16 @@ mod tests {
         values.bending_by_block.push(BlockValue { block: 3, value: 0.25 });
         assert_eq!(value_of("bending", &values), own);
         assert_eq!(value_of("bending.3", &values), FoxgloveValue::Float64(0.25));
+        let old = list(&values);
+        values.bending_by_block.clear();
+        values.bending = Some(0.5);
+        let ended = ended_blocks(&old, &values);
+        let [ended] = &ended[..] else { panic!("{ended:?}") };
+        assert_eq!(
+            (ended.name.as_str(), &ended.value),
+            ("bending.3", &Some(FoxgloveValue::Float64(0.5)))
+        );
+        assert!(ended_blocks(&old[..old.len() - 1], &values).is_empty());
     }
 
     #[test]

@@ -117,6 +117,7 @@ impl RequestBridge {
         let old = old.as_ref().map(parameters::list).unwrap_or_default();
         let mut changed = parameters::list(&new);
         changed.retain(|parameter| !old.contains(parameter));
+        changed.extend(parameters::ended_blocks(&old, &new));
         if !changed.is_empty() {
             library.publish_parameter_values(changed);
         }

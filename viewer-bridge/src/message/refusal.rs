@@ -14,6 +14,8 @@ pub enum Refusal {
     Node(Reason),
     /// The node refused a value of this parameter.
     OutsideRange(Parameter),
+    /// The node refused a value or the block of this parameter.
+    OutsideBlocks(Parameter),
     /// The node gave a reason that this version does not know.
     Unknown,
     /// No node runs.
@@ -62,11 +64,14 @@ impl Refusal {
     /// The reason for which the node refused an action.
     pub(crate) fn of_action(reason: Reason, action: &Action) -> Self {
         let parameter = match action {
-            Action::Set { parameter, .. } => Parameter::from_name(parameter.as_str()),
+            Action::Set { parameter, block, .. } => {
+                Parameter::from_name(parameter.as_str()).map(|parameter| (parameter, *block))
+            }
             _ => None,
         };
         match (reason, parameter) {
-            (Reason::OutOfRange, Some(parameter)) => Self::OutsideRange(parameter),
+            (Reason::OutOfRange, Some((parameter, None))) => Self::OutsideRange(parameter),
+            (Reason::OutOfRange, Some((parameter, Some(_)))) => Self::OutsideBlocks(parameter),
             _ => Self::Node(reason),
         }
     }
@@ -75,7 +80,7 @@ impl Refusal {
     pub fn name(self) -> &'static str {
         match self {
             Self::Node(reason) => reason.name(),
-            Self::OutsideRange(_) => Reason::OutOfRange.name(),
+            Self::OutsideRange(_) | Self::OutsideBlocks(_) => Reason::OutOfRange.name(),
             Self::Unknown => "unknown",
             Self::NoNode => "no_node",
             Self::NoAnswer => "no_answer",
@@ -105,6 +110,15 @@ impl Refusal {
             Self::OutsideRange(parameter) => {
                 let info = parameter.info();
                 return format!("{} accepts {}", info.name, info.range.text).into();
+            }
+            Self::OutsideBlocks(Parameter::Bending) => {
+                let info = Parameter::Bending.info();
+                let name = info.name;
+                let range = info.range.text;
+                return format!("{name} of a block accepts {range}, for a shape with bends").into();
+            }
+            Self::OutsideBlocks(parameter) => {
+                return format!("{} has no values for blocks", parameter.name()).into();
             }
             Self::Unknown => "the node gave an unknown reason",
             Self::NoNode => "no node is running; start one with `sim-node run`",
@@ -202,6 +216,8 @@ impl Serialize for Refusal {
 
 #[cfg(test)]
 mod tests {
+    use sim_contract::{ParameterValue, Text};
+
     use super::*;
 
     #[test]
@@ -219,6 +235,16 @@ mod tests {
             Refusal::OutsideRange(Parameter::TearForce).text("set"),
             "tear_force accepts a number > 0"
         );
+        let of_block = |name: &str| {
+            let (parameter, value) = (Text::cut(name), ParameterValue::Number(1.0));
+            let set = Action::Set { parameter, value, constraint_kind: None, block: Some(7) };
+            Refusal::of_action(Reason::OutOfRange, &set).text("set")
+        };
+        assert_eq!(
+            of_block("bending"),
+            "bending of a block accepts a number >= 0, for a shape with bends"
+        );
+        assert_eq!(of_block("damping"), "damping has no values for blocks");
         assert!(Refusal::UnknownScene.text("load").contains("sim-node scenes"));
     }
 }

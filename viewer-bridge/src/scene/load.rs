@@ -23,6 +23,9 @@ pub(crate) enum LoadError {
     /// An end of a constraint is not a particle.
     #[error("a constraint of the scene joins particles that do not exist")]
     Constraint,
+    /// A particle of a bend does not exist.
+    #[error("a bend of the scene has particles that do not exist")]
+    Bend,
     /// A corner of a triangle is not a particle.
     #[error("a triangle of the scene has corners that do not exist")]
     Triangle,
@@ -35,6 +38,9 @@ impl Load {
         let is_particle = |index: &u32| *index < particle_count;
         if !self.constraints.iter().all(|one| is_particle(&one.a) && is_particle(&one.b)) {
             return Err(LoadError::Constraint);
+        }
+        if !self.bends.iter().all(|one| one.particles.iter().all(is_particle)) {
+            return Err(LoadError::Bend);
         }
         if !self.triangles.iter().all(|one| one.corners.iter().all(is_particle)) {
             return Err(LoadError::Triangle);
@@ -71,7 +77,7 @@ impl Load {
                 up: summary.up.name().to_owned(),
                 run_id: format!("{:016x}", self.header.run_id),
                 shapes: self.shapes(),
-                has_bends: !self.bends.is_empty(),
+                has_explicit_bends: self.bends.iter().any(|bend| bend.block < 0),
                 anchors: summary.poses.anchored().collect(),
             },
             collider_meshes: summary.collider_meshes.clone(),

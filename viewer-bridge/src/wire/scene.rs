@@ -59,9 +59,9 @@ pub struct SceneText {
     pub run_id: String,
     /// The generated shapes.
     pub shapes: Vec<ShapeText>,
-    /// The scene has bends, generated or explicit.
+    /// The scene has bends that belong to no shape.
     #[serde(default)]
-    pub has_bends: bool,
+    pub has_explicit_bends: bool,
     /// The particles of each anchor.
     #[serde(default)]
     pub anchors: Vec<Vec<u32>>,

@@ -53,7 +53,7 @@ fn scene() -> Scene {
                 count: 3,
                 has_bends: true,
             }],
-            has_bends: true,
+            has_explicit_bends: true,
         },
         collider_meshes: [(2, triangle_mesh())].into(),
         ..Scene::default()

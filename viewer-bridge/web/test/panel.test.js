@@ -2,7 +2,7 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { ROWS, SLIDER_STEPS, editable, partsOf, positionOf, rangeOf, restoring, rowsOf, typedValue, unitOf, valueAt } from "../js/panel/parameters.js";
+import { ROWS, SLIDER_STEPS, editable, hasBends, partsOf, positionOf, rangeOf, restoring, rowsOf, typedValue, unitOf, valueAt } from "../js/panel/parameters.js";
 import { valueOf } from "../js/net/messages.js";
 import { niceCeiling } from "../js/geometry/round.js";
 import { readable } from "../js/ui/format.js";
@@ -86,10 +86,14 @@ const SHAPES = [{ shape: "cloth", has_bends: true }, { shape: "web", has_bends: 
 test("a scene with bends has a row for them, with a choice of the shapes that bend", () => {
   const names = (hasBends) => rowsOf("xpbd", hasBends).map((row) => row.name);
   assert.ok(names(true).includes("bending") && !names(false).includes("bending"));
-  assert.deepEqual(partsOf(row("bending"), SHAPES, ["shear"]), [{ part: "0", text: "0 cloth" }, { part: "2", text: "2 rope" }]);
-  assert.deepEqual(partsOf(row("bending"), SHAPES.slice(1), ["shear"]), [], "all is the same");
-  assert.deepEqual(partsOf(row("compliance"), SHAPES, ["shear"]), [{ part: "shear", text: "shear" }]);
-  assert.deepEqual(partsOf(row("damping"), SHAPES, ["shear"]), []);
+  const parts = (name, shapes, hasExplicitBends = false) => partsOf(row(name), { shapes, hasExplicitBends }, ["shear"]);
+  assert.deepEqual(parts("bending", SHAPES), [{ part: "0", text: "0 cloth" }, { part: "2", text: "2 rope" }]);
+  assert.deepEqual(parts("bending", SHAPES.slice(1)), [], "all is the same");
+  assert.deepEqual(parts("bending", SHAPES.slice(1), true), [{ part: "1", text: "1 rope" }], "all has other bends, too");
+  assert.deepEqual(parts("compliance", SHAPES), [{ part: "shear", text: "shear" }]);
+  assert.deepEqual(parts("damping", SHAPES), []);
+  const has = (shapes, hasExplicitBends) => hasBends({ shapes, hasExplicitBends });
+  assert.deepEqual([has(SHAPES, false), has([], true), has(SHAPES.slice(1, 2), false)], [true, true, false]);
 });
 
 test("a rigidity is in N m, and in N m² for ropes", () => {

@@ -23,7 +23,7 @@ const readers = {
     ends: Array.from({ length: m.constraintCount }, (_, i) => [m.ends[2 * i], m.ends[2 * i + 1]]),
     min: m.min, max: m.max, origin: m.origin, rate_hz: m.rateHz,
     flags: m.isPlanar ? 1 : 0,
-    text: { name: m.name, unit: m.unit, up: m.up, run_id: m.runId, shapes: m.shapes, has_bends: m.hasBends, anchors: m.anchors },
+    text: { name: m.name, unit: m.unit, up: m.up, run_id: m.runId, shapes: m.shapes, has_explicit_bends: m.hasExplicitBends, anchors: m.anchors },
     meshes: [...m.meshes].map(([collider, mesh]) => ({ collider, vertices: triples(mesh.vertices), triangles: triples(mesh.triangles) })),
   }),
   frame: (m) => ({

@@ -2,11 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
+use anyhow::Context;
 use recorder::{
     CollidersRow, ContentSelection, FileSource, Frame, FrameReader, LogEnd, LogReader, Message,
     RunDescription, Tape, recorded_scene, torn_before_first,
 };
-use sim_contract::{Method, Stop};
+use sim_contract::{BendState, Method, Stop};
 use sim_solver::Solver;
 
 use super::complete_state::keyframe_of;
@@ -22,17 +23,18 @@ pub(super) struct Recording {
     tape: Tape,
     /// Number of colliders in the first snapshot. `None` if the file has none before it.
     collider_count: Option<usize>,
-    /// `None` until they are needed.
-    sizes: Option<Sizes>,
+    /// `None` until a load is published.
+    needs: Option<Needs>,
     stop: Stop,
 }
 
-/// Sizes of the messages of a load.
-#[derive(Debug, Clone, Copy)]
-struct Sizes {
+/// What the messages of a load need besides its rows.
+#[derive(Debug)]
+struct Needs {
     /// Number of colliders. It never changes in a recording.
     collider_count: usize,
     keyframe_size_bytes_max: usize,
+    bends: Vec<BendState>,
 }
 
 /// A place in a recording: its next snapshot, and the state before it.
@@ -80,7 +82,7 @@ impl Recording {
             frames,
             tape,
             collider_count,
-            sizes: None,
+            needs: None,
             stop: stop.clone(),
         })
     }
@@ -107,28 +109,30 @@ impl Recording {
 
     /// Returns the data of the load.
     pub(super) fn recorded(&mut self) -> anyhow::Result<Recorded<'_>> {
-        let Sizes { collider_count, keyframe_size_bytes_max } = self.sizes()?;
+        let needs = match self.needs.take() {
+            Some(needs) => needs,
+            None => self.find_needs()?,
+        };
+        let Needs { collider_count, keyframe_size_bytes_max, bends } = self.needs.insert(needs);
         Ok(Recorded {
             run: self.tape.run(),
             scene: self.frames.log().scene(),
             topology: self.tape.topology(),
+            bends,
             surface: self.tape.surface(),
-            collider_count,
-            keyframe_size_bytes_max,
+            collider_count: *collider_count,
+            keyframe_size_bytes_max: *keyframe_size_bytes_max,
         })
     }
 
-    fn sizes(&mut self) -> anyhow::Result<Sizes> {
-        if let Some(sizes) = self.sizes {
-            return Ok(sizes);
-        }
+    fn find_needs(&self) -> anyhow::Result<Needs> {
         let solver = Solver::new(&recorded_scene(self.frames.log())?);
-        let sizes = Sizes {
+        let bends = self.tape.bends();
+        Ok(Needs {
             collider_count: self.collider_count.unwrap_or_else(|| solver.collider_count()),
             keyframe_size_bytes_max: solver.keyframe_size_bytes_max(),
-        };
-        self.sizes = Some(sizes);
-        Ok(sizes)
+            bends: bends.context("the columns of the bends in /topology differ in length")?,
+        })
     }
 
     /// Continues with the snapshot of the last recorded step up to `step` whose header is readable. Its state

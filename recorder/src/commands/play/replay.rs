@@ -8,9 +8,10 @@ use recorder::{
 };
 use sim_contract::clock::monotonic_ns;
 use sim_contract::{
-    CONTRACT_VERSION, CollidersHeader, Command, Endpoint, ForcesHeader, KeyframeHeader, Load,
-    LoadHeader, NodeStatus, OUTCOME_FLAG_CONTROL, Outcome, Owner, OwnerError, ParameterValues,
-    Reason, ReceivedCommand, SnapshotFlags, SnapshotHeader, StatusFlags, TearsHeader, Torn, Wake,
+    BendState, CONTRACT_VERSION, CollidersHeader, Command, Endpoint, ForcesHeader, KeyframeHeader,
+    Load, LoadHeader, NodeStatus, OUTCOME_FLAG_CONTROL, Outcome, Owner, OwnerError,
+    ParameterValues, Reason, ReceivedCommand, SnapshotFlags, SnapshotHeader, StatusFlags,
+    TearsHeader, Torn, Wake,
 };
 
 use super::control::Control;
@@ -23,6 +24,7 @@ pub(crate) struct Recorded<'a> {
     pub(crate) run: &'a RunDescription,
     pub(crate) scene: &'a [u8],
     pub(crate) topology: &'a TopologyRow,
+    pub(crate) bends: &'a [BendState],
     pub(crate) surface: &'a SurfaceRow,
     pub(crate) collider_count: usize,
     /// Size of the longest keyframe of the scene.
@@ -76,12 +78,10 @@ impl Replay {
         recorded: &Recorded<'_>,
         mut position: Position,
     ) -> anyhow::Result<Self> {
-        let Recorded { run, scene, topology, surface, .. } = *recorded;
+        let Recorded { run, scene, topology, bends, surface, .. } = *recorded;
         let run_id = getrandom::u64().context("cannot get a random run id")?;
         let constraints =
             topology.constraints().context("the columns of /topology differ in length")?;
-        let bends =
-            topology.bends().context("the columns of the bends in /topology differ in length")?;
         let triangles = surface
             .triangles()
             .context("the number of indices in /surface is not a multiple of three")?;
@@ -90,7 +90,7 @@ impl Replay {
             header,
             scene,
             constraints: &constraints,
-            bends: &bends,
+            bends,
             triangles: &triangles,
             collider_count: recorded.collider_count,
             keyframe_size_bytes_max: recorded.keyframe_size_bytes_max,

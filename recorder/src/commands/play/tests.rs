@@ -83,6 +83,7 @@ fn replay_after(domain: &TestDomain, owner: Option<Owner>, position: Position) -
             &[ConstraintState { b: 1, ..Default::default() }; 4],
             &[],
         ),
+        bends: &[],
         surface: &SurfaceRow::new(&load, &[Triangle { corners: [0, 1, 0] }]),
         collider_count: 1,
         keyframe_size_bytes_max: 64,

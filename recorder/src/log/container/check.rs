@@ -447,8 +447,7 @@ impl Check {
                 );
                 self.findings.add_index(end, "metadata 'recorder'", what);
             }
-            // Recorders of older formats do not count /tf, which belongs to the header.
-            let is_counted = topic != Topic::Tf || content.counts_transforms;
+            let is_counted = topic != Topic::Tf || content.counts_transforms();
             if is_counted && claimed.written != counted.written {
                 let what = format!(
                     "it counts {} messages on {name}, but the file has {}",

@@ -5,21 +5,21 @@ use std::collections::BTreeMap;
 use mcap::records::{Channel, MessageHeader};
 use sim_solver::Keyframe;
 
-use super::lost_load::{LoadRows, LoadWatch};
+use super::lost_load::{LoadRows, LoadWatch, LostLoad};
 use super::tears::HashSeeds;
 use crate::log::backlog::Backlog;
 use crate::log::encoding::channel::TopicChannel;
 use crate::log::encoding::particle_bytes;
 use crate::log::message::Message;
-use crate::log::read::audit::{format_version, is_current_format};
+use crate::log::read::audit::format_version;
 use crate::log::read::decode::MessageDecoder;
 use crate::log::read::gaps::GapCounter;
 use crate::log::read::limits::SizeLimits;
 use crate::log::read::read_error::ReadError;
 use crate::log::read::reader::read_run;
 use crate::log::rows::{ForcesRow, StepRow, TearsRow};
-use crate::log::run::RunDescription;
 use crate::log::run::selection::ContentSelection;
+use crate::log::run::{BENDS_VERSION, RunDescription};
 use crate::log::state_hash::hash_bytes;
 use crate::log::topic::{AllCounts, Topic};
 
@@ -48,9 +48,7 @@ pub(super) enum Sound {
 pub(super) struct ContentCheck {
     run: RunDescription,
     /// The file has the format that this recorder writes.
-    pub(super) is_current_format: bool,
-    /// The recorder that wrote it counts /tf.
-    pub(super) counts_transforms: bool,
+    format_version: u32,
     selection: ContentSelection,
     limits: SizeLimits,
     channels: BTreeMap<u16, Option<TopicChannel>>,
@@ -69,22 +67,35 @@ pub(super) struct ContentCheck {
     pub(super) unhashed_count: u64,
 }
 
-/// First version of the format that counts /tf.
-const COUNTED_TRANSFORMS_VERSION: u32 = 5;
+/// First version of the format with the channels of today, and a count of /tf.
+const CHANNELS_VERSION: u32 = 5;
 
 impl ContentCheck {
+    /// Returns `true` if the recorder that wrote the file counts /tf, which belongs to the header.
+    pub(super) fn counts_transforms(&self) -> bool {
+        self.format_version >= CHANNELS_VERSION
+    }
+
+    /// Returns `true` if the file has the channels of a file of today.
+    pub(super) fn has_channels_of_today(&self) -> bool {
+        self.format_version >= CHANNELS_VERSION
+    }
+
+    /// Returns what is known of a load that the file lacks.
+    pub(super) fn lost_load(&self) -> Option<LostLoad> {
+        self.load.lost(self.format_version >= BENDS_VERSION)
+    }
+
     /// Starts with the metadata `run` of a file.
     pub(super) fn new(
         run: &BTreeMap<String, String>,
         selection: ContentSelection,
         scene_size_bytes: usize,
     ) -> Result<Self, ReadError> {
-        let is_current_format = is_current_format(run);
-        let counts_transforms = format_version(run) >= COUNTED_TRANSFORMS_VERSION;
+        let format_version = format_version(run);
         let run = read_run(run)?;
         Ok(Self {
-            is_current_format,
-            counts_transforms,
+            format_version,
             selection,
             limits: SizeLimits::new(&run, scene_size_bytes),
             backlog: Backlog::new(&run, scene_size_bytes),

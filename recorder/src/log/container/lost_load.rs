@@ -14,6 +14,8 @@ pub struct LostLoad {
     pub revision: u32,
     /// The constraints that were torn before the first snapshot, in the order of tearing.
     pub torn: Vec<u32>,
+    /// The format of the file lists the bends.
+    pub has_bends: bool,
 }
 
 /// The rows of a load.
@@ -99,9 +101,9 @@ impl LoadWatch {
     }
 
     /// Returns what is known of the load, if the file has none and everything is known.
-    pub(super) fn lost(&self) -> Option<LostLoad> {
+    pub(super) fn lost(&self, has_bends: bool) -> Option<LostLoad> {
         let (step, revision) = self.first.map(|row| (row.step, row.topology_revision))?;
         let torn = self.torn.clone().filter(|_| self.is_start_lost && !self.has_topology)?;
-        Some(LostLoad { step, revision, torn })
+        Some(LostLoad { step, revision, torn, has_bends })
     }
 }

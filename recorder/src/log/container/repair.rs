@@ -403,7 +403,7 @@ impl<W: Write> Repair<W> {
         let (Some(salvage), Some(content)) = (&mut self.salvage, &mut self.content) else {
             return Ok(());
         };
-        if content.has_channels() || !content.is_current_format {
+        if content.has_channels() || !content.has_channels_of_today() {
             return Ok(());
         }
         salvage.declare_channels(content, self.load.take())
@@ -483,7 +483,7 @@ impl<W: Write> Repair<W> {
             counts: content.counts,
             steps: self.first_step.zip(last).map(|(first, last)| [first, last]),
             losses,
-            lost_load: content.load.lost(),
+            lost_load: content.lost_load(),
             has_end,
             after_end: self.after_end,
             scene: self.scene,

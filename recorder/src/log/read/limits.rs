@@ -118,13 +118,13 @@ impl SizeLimits {
 #[cfg(test)]
 mod tests {
     use sim_contract::{
-        BendState, COLLIDERS_MAX, ConstraintState, ELEMENTS_MAX, LoadHeader, PlainF32, TearCause,
-        TornConstraint,
+        BendState, BlockValue, COLLIDERS_MAX, ConstraintState, ELEMENTS_MAX, LoadHeader,
+        ParameterValues, PlainF32, TearCause, TornConstraint,
     };
     use sim_solver::{Scene, Solver, builtin};
 
     use super::*;
-    use crate::log::rows::{SurfaceRow, TearsRow, TopologyRow};
+    use crate::log::rows::{ParametersRow, SurfaceRow, TearsRow, TopologyRow};
 
     fn limits(particle_count: u64, constraint_count: u64, scene_size_bytes: u64) -> SizeLimits {
         SizeLimits { particle_count, constraint_count, bend_count: 0, scene_size_bytes }
@@ -164,10 +164,15 @@ mod tests {
         let torn = vec![TornConstraint::new(index, Some(TearCause::Distance)); count];
         let tears = TearsRow::new(u64::MAX, &torn);
         let surface = SurfaceRow { step: 0, triangles: vec![index; 3 * 2 * count] };
+        let blocks = (0..500).map(|block| BlockValue { block: index - 500 + block, value: number });
+        let values =
+            ParameterValues { bending_by_block: blocks.collect(), ..ParameterValues::default() };
+        let parameters = ParametersRow { step: u64::MAX, values };
         let limits =
-            SizeLimits { bend_count: count as u64, ..limits(count as u64, count as u64, 0) };
+            SizeLimits { bend_count: count as u64, ..limits(count as u64, count as u64, 500 * 30) };
         for (topic, text) in [
             (Topic::Topology, serde_json::to_string(&topology).unwrap()),
+            (Topic::Parameters, serde_json::to_string(&parameters).unwrap()),
             (Topic::Tears, serde_json::to_string(&tears).unwrap()),
             (Topic::Surface, serde_json::to_string(&surface).unwrap()),
         ] {

@@ -59,7 +59,10 @@ impl Digest {
                 self.colliders.push(row.clone());
             }
             Message::Tears(_) | Message::Outcome(_) => self.size_bytes += message.size_bytes(),
-            Message::Parameters(row) => self.parameters.push(row.clone()),
+            Message::Parameters(row) => {
+                self.size_bytes += message.size_bytes();
+                self.parameters.push(row.clone());
+            }
             Message::Status(row) => {
                 self.size_bytes += message.size_bytes();
                 self.statuses.push(row.clone());

@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
-use sim_types::{ConstraintKind, Parameter, ParameterValue, ParameterValues, Setting};
+use sim_types::{BlockValue, ConstraintKind, Parameter, ParameterValue, ParameterValues, Setting};
 
 /// Header of `parameters`: 24 bytes, alignment 8. The payload holds the values of all parameters.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable, ZeroCopySend)]
@@ -23,7 +23,7 @@ const _: () = assert!(size_of::<ParametersHeader>() == 24 && align_of::<Paramete
 
 /// The value of one parameter: 28 bytes, alignment 4; an element of `parameters`. A parameter with a
 /// value for each kind of constraint has one element for each kind. `bending` has one element for all bends,
-/// and after it one for each generated block with another value.
+/// and after all parameters one for each generated block with a value of its own.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable, ZeroCopySend)]
 #[repr(C)]
 #[type_name("catenary.ParameterState")]
@@ -32,7 +32,7 @@ pub struct ParameterState {
     pub parameter: u32,
     /// A [`ConstraintKind`] as a number, for a parameter with a value for each kind; else 0.
     pub constraint_kind: u32,
-    /// Index of a generated block, for its `bending`; else -1.
+    /// Index of a generated block, for its `bending`; else -1, because 0 is a block.
     pub block: i32,
     /// Form of the value: 0 is off, 1 a number, 2 three numbers.
     pub form: u32,
@@ -52,7 +52,7 @@ impl From<Setting> for ParameterState {
         Self {
             parameter: setting.parameter as u32,
             constraint_kind: setting.constraint_kind.map_or(0, |kind| kind as u32),
-            block: setting.block.and_then(|block| i32::try_from(block).ok()).unwrap_or(-1),
+            block: setting.block.map_or(-1, |block| i32::try_from(block).unwrap_or(i32::MAX)),
             form,
             value,
         }
@@ -85,15 +85,26 @@ impl ParameterState {
 /// Collects the values of a message. Parameters that the message lacks have their defaults.
 pub(crate) fn to_values(states: &[ParameterState]) -> ParameterValues {
     let mut values = ParameterValues::default();
+    let mut of_blocks = Vec::new();
     for setting in states.iter().filter_map(ParameterState::setting) {
-        values.set(setting);
+        match (setting.block, setting.value) {
+            (Some(block), ParameterValue::Number(value)) => {
+                of_blocks.push(BlockValue { block, value });
+            }
+            (Some(_), _) => {}
+            (None, _) => values.set(setting),
+        }
     }
+    // The owner sends each block once, ascending.
+    of_blocks.sort_by_key(|one| one.block);
+    of_blocks.dedup_by_key(|one| one.block);
+    values.bending_by_block = of_blocks;
     values
 }
 
 #[cfg(test)]
 mod tests {
-    use sim_types::{BlockValue, PerKind};
+    use sim_types::PerKind;
 
     use super::*;
 

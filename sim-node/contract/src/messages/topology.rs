@@ -27,8 +27,9 @@ const _: () = assert!(size_of::<ConstraintState>() == 20 && align_of::<Constrain
 /// change until the next load, and never tears; it stops acting once a constraint of its path is torn.
 ///
 /// With C the sum of c x over its particles, its energy in J is |C - rest n|^2 / (2 alpha), where
-/// alpha = `geometry` / rigidity is its compliance in m/N, and n the unit vector along the sum of the unit
-/// normals of the two triangles of a hinge. `set bending` replaces the rigidity.
+/// alpha = `geometry` / rigidity is its compliance in m/N. For the positions p0 to p3 of a hinge, n is the unit
+/// vector along the sum of the unit normals of its triangles, along (p2 - p1) x (p0 - p1) and
+/// (p3 - p1) x (p2 - p1). `set bending` replaces the rigidity.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable, ZeroCopySend)]
 #[repr(C)]
 #[type_name("catenary.BendState")]

@@ -1,6 +1,7 @@
 //! The data that an owner publishes per load, and the writers whose sizes follow from it.
 
 use std::cell::RefCell;
+use std::collections::BTreeSet;
 use std::fs::File;
 
 use crate::messages::collider::{ColliderState, CollidersHeader};
@@ -95,7 +96,7 @@ impl Capacities {
             bends: single(load.bends.len()),
             surface: single(load.triangles.len()),
             tears: many(&TEARS, load.constraints.len()),
-            parameters: many(&PARAMETERS, SETTINGS_COUNT + block_count(load.bends)),
+            parameters: many(&PARAMETERS, SETTINGS_COUNT + bent_block_count(load.bends)),
             colliders: many(&COLLIDERS, load.collider_count),
         }
     }
@@ -227,10 +228,11 @@ impl LoadWriters {
     }
 }
 
-/// Returns the number of blocks up to the last one with bends.
-fn block_count(bends: &[BendState]) -> usize {
-    let last = bends.iter().map(|bend| bend.block).max();
-    last.and_then(|block| usize::try_from(block + 1).ok()).unwrap_or(0)
+/// Returns the number of generated blocks with bends, each of which can have a setting of its own.
+fn bent_block_count(bends: &[BendState]) -> usize {
+    let blocks: BTreeSet<_> =
+        bends.iter().map(|bend| bend.block).filter(|block| *block >= 0).collect();
+    blocks.len()
 }
 
 /// Returns the length of a payload. The limits of the contract keep it within u32.
@@ -242,6 +244,7 @@ pub(crate) fn check_limits(load: &Load<'_>) -> Result<(), OwnerError> {
     let limits = [
         ("particles", load.header.particle_count as usize, ELEMENTS_MAX as usize),
         ("constraints", load.constraints.len(), ELEMENTS_MAX as usize),
+        ("bends", load.bends.len(), ELEMENTS_MAX as usize),
         ("colliders", load.collider_count, COLLIDERS_MAX),
         ("bytes of text", load.scene.len(), SCENE_SIZE_BYTES_MAX),
     ];

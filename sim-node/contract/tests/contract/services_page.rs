@@ -280,7 +280,7 @@ fn state_numbers() -> [Numbers; 10] {
     ]
 }
 
-const OPTIONS: [(u32, &str); 10] = [
+const OPTIONS: [(u32, &str); 11] = [
     (CommandOptions::LIMIT, "limit"),
     (CommandOptions::VALUE_NUMBER, "value is a number"),
     (CommandOptions::VALUE_VECTOR, "value is a vector"),
@@ -291,6 +291,7 @@ const OPTIONS: [(u32, &str); 10] = [
     (CommandOptions::BACK, "back steps"),
     (CommandOptions::STATE, "state"),
     (CommandOptions::MOTION, "motion"),
+    (CommandOptions::BLOCK, "block"),
 ];
 
 #[test]

@@ -156,8 +156,9 @@ class Topology:
 class Bends:
     """The bends of a scene, as loaded: resistance to curvature.
 
-    With C the sum of c x over the particles of a bend, its energy in J is |C - rest n|^2 rigidity / (2 geometry),
-    where n is the unit vector along the sum of the unit normals of a hinge's triangles.
+    With C the sum of c x over the particles of a bend, its energy in J is |C - rest n|^2 rigidity / (2 geometry).
+    For the positions p0 to p3 of a hinge, n is the unit vector along the sum of the unit normals of its triangles,
+    along (p2 - p1) x (p0 - p1) and (p3 - p1) x (p2 - p1).
     """
 
     @property

@@ -131,7 +131,8 @@ def _settings(name: str, value: Any) -> list[Action]:
     if not isinstance(value, Mapping):
         return [Action.set(name, value)]
     if not value:
-        raise TypeError(f"`{name}` is empty: give a number for a kind, such as {{'shear': 0.5}}")
+        part = "a block, such as {1: 1e-3}" if name == "bending" else "a kind, such as {'shear': 0.5}"
+        raise TypeError(f"`{name}` is empty: give a number for {part}")
     return [_setting_of(name, part, number) for part, number in value.items()]
 
 

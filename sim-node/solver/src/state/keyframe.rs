@@ -9,11 +9,14 @@ use sim_types::{Method, ParameterValues, ParticleFlags, TearCause};
 use crate::constraints::tethers::TetherBasis;
 use crate::frame::{Frame, Pose};
 use crate::parameters::Parameters;
+use crate::parameters::block_bending::BlockBending;
 use crate::solver::Solver;
 use crate::step::drive::ActiveGrab;
 
 /// First four bytes of an encoded keyframe, little-endian. It changes with the fields below.
 const KEYFRAME_VERSION: u32 = 4;
+/// The version before blocks could have a bending of their own.
+const WITHOUT_BLOCKS_VERSION: u32 = 3;
 
 /// The state beside the particles of a snapshot. Both together are the complete state after a step.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -79,7 +82,9 @@ pub enum KeyframeError {
     #[error("{0} bytes follow the end of the keyframe")]
     TooLong(usize),
     /// Another version wrote it.
-    #[error("keyframe version {found}; this program reads version {KEYFRAME_VERSION}")]
+    #[error(
+        "keyframe version {found}; this program reads versions {WITHOUT_BLOCKS_VERSION} and {KEYFRAME_VERSION}"
+    )]
     Version {
         /// The version in the bytes.
         found: u32,
@@ -122,6 +127,7 @@ impl Keyframe {
             + self.tethers.size_bytes()
             + size_of_val(self.moved_anchors.as_slice())
             + size_of_val(self.moved_colliders.as_slice())
+            + self.parameters.block_bending.size_bytes()
     }
 
     /// Returns the cause of each tear in [`Self::torn`].
@@ -130,17 +136,18 @@ impl Keyframe {
     }
 
     /// Encodes the keyframe: its version as a little-endian u32, then the fields in postcard's
-    /// encoding.
+    /// encoding, and the bending of each generated block.
     ///
     /// # Panics
     /// Never: the fields always have an encoding.
     #[allow(clippy::expect_used, reason = "encoding numbers into a growing Vec cannot fail")]
     pub fn encode(&self) -> Vec<u8> {
         let bytes = KEYFRAME_VERSION.to_le_bytes().to_vec();
-        postcard::to_extend(self, bytes).expect("numbers have an encoding")
+        let fields = (self, self.parameters.block_bending.used());
+        postcard::to_extend(&fields, bytes).expect("numbers have an encoding")
     }
 
-    /// Decodes the bytes of [`Self::encode`].
+    /// Decodes the bytes of [`Self::encode`], also those of version 3, in which no block has a bending of its own.
     ///
     /// # Errors
     /// Another version wrote the bytes, or they are damaged.
@@ -148,14 +155,17 @@ impl Keyframe {
         let Some((version, fields)) = bytes.split_first_chunk() else {
             return Err(KeyframeError::TooShort(bytes.len()));
         };
-        let found = u32::from_le_bytes(*version);
-        if found != KEYFRAME_VERSION {
-            return Err(KeyframeError::Version { found });
-        }
-        match postcard::take_from_bytes(fields)? {
-            (keyframe, []) => Ok(keyframe),
-            (_, rest) => Err(KeyframeError::TooLong(rest.len())),
-        }
+        let (keyframe, rest) = match u32::from_le_bytes(*version) {
+            KEYFRAME_VERSION => {
+                let ((mut keyframe, blocks), rest) =
+                    postcard::take_from_bytes::<(Self, Vec<Option<f32>>)>(fields)?;
+                keyframe.parameters.block_bending = BlockBending::from_used(blocks);
+                (keyframe, rest)
+            }
+            WITHOUT_BLOCKS_VERSION => postcard::take_from_bytes(fields)?,
+            found => return Err(KeyframeError::Version { found }),
+        };
+        if rest.is_empty() { Ok(keyframe) } else { Err(KeyframeError::TooLong(rest.len())) }
     }
 }
 

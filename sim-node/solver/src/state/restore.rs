@@ -64,6 +64,7 @@ impl Solver {
         self.scene_step = keyframe.scene_step;
         self.is_put_in_place = false;
         self.parameters.clone_from(&keyframe.parameters);
+        self.parameters.block_bending.make_room_for(self.model.bent_blocks.len());
         self.restore_constraints(keyframe);
         self.restore_frames(keyframe);
         self.state_hash = state_hash(&self.particles.states, self.torn.hash_seed());

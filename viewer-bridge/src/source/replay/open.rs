@@ -113,7 +113,7 @@ fn load_of(tape: &Tape) -> anyhow::Result<Load> {
     let constraints = topology.constraints();
     let constraints =
         constraints.with_context(|| malformed("the columns of /topology differ in length"))?;
-    let bends = topology.bends();
+    let bends = tape.bends();
     let bends = bends
         .with_context(|| malformed("the columns of the bends in /topology differ in length"))?;
     let triangles = surface.triangles();

@@ -13,7 +13,7 @@
  *   min: Vec3, max: Vec3, rateHz: number, origin: Vec3,
  *   positions: Float32Array, ends: Uint32Array, restLengths: Float32Array, triangles: Uint32Array,
  *   constraintKinds: Uint8Array, name: string, unit: string, up: string, runId: string,
- *   meshes: Map<number, ColliderMesh>, shapes: Shape[], hasBends: boolean, anchors: number[][], compliances: Float32Array,
+ *   meshes: Map<number, ColliderMesh>, shapes: Shape[], hasExplicitBends: boolean, anchors: number[][], compliances: Float32Array,
  * }} Scene  array lengths for n particles, s constraints and t triangles: 3 n, 2 s, s, 3 t, s; compliances: s, or stiffness in pbd; anchors: the particles of each
  *
  * @typedef {{ shape: string, first: number, count: number, has_bends?: boolean }} Shape  a generated shape, with its particles
@@ -171,7 +171,7 @@ function decodeScene(reader, header) {
     kind: "scene", ...header, particleCount, constraintCount, triangleCount,
     isPlanar: (flags & 1) !== 0,
     min, max, rateHz, origin, positions, ends, restLengths, triangles, constraintKinds,
-    name: json.name ?? "", unit: json.unit ?? "m", up: json.up ?? "y", runId: json.run_id ?? "", shapes: json.shapes ?? [], hasBends: json.has_bends ?? false, anchors: json.anchors ?? [],
+    name: json.name ?? "", unit: json.unit ?? "m", up: json.up ?? "y", runId: json.run_id ?? "", shapes: json.shapes ?? [], hasExplicitBends: json.has_explicit_bends ?? false, anchors: json.anchors ?? [],
     meshes: decodeMeshes(reader), compliances: reader.array(Float32Array, constraintCount),
   };
 }

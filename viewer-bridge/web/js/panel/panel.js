@@ -3,7 +3,7 @@
 
 import { KINDS } from "../state/quantity.js";
 import { find, make } from "../ui/dom.js";
-import { SLIDER_STEPS, editable, partsOf, positionOf, rangeOf, restoring, rowsOf, unitOf, valueAt, vectorOf } from "./parameters.js";
+import { SLIDER_STEPS, editable, hasBends, partsOf, positionOf, rangeOf, restoring, rowsOf, unitOf, valueAt, vectorOf } from "./parameters.js";
 import { valueOf } from "../net/messages.js";
 import { unitIn } from "../ui/units.js";
 import { ValueField } from "./value-field.js";
@@ -11,6 +11,8 @@ import { ValueField } from "./value-field.js";
 /** @typedef {import("./parameters.js").Row} Row */
 /** @typedef {import("../net/messages.js").ParameterValue} ParameterValue */
 
+/** What is known of the bends without a scene. @type {import("./parameters.js").Bends} */
+const NO_BENDS = { shapes: [], hasExplicitBends: false };
 const AXES = ["x", "y", "z"];
 /** Wind drag set along with a wind velocity if there is none, as wind has no effect without drag: the default of scenes, in kg/m³. */
 const WIND_DRAG = 0.6;
@@ -35,7 +37,7 @@ export class Panel {
   }
 
   rows() {
-    return rowsOf(this.simulation.node?.method ?? null, this.simulation.scene?.hasBends ?? false);
+    return rowsOf(this.simulation.node?.method ?? null, hasBends(this.simulation.scene ?? NO_BENDS));
   }
 
   /** Rebuilds the rows for another scene or method; otherwise refreshes their values. */
@@ -121,9 +123,10 @@ export class Panel {
     });
   }
 
-  /** Tells screen readers the value of a slider, instead of its position. @param {HTMLInputElement} slider @param {Row} row @param {ParameterValue} value */
-  describe(slider, row, value) {
-    slider.setAttribute("aria-valuetext", `${editable(value)} ${this.unit(row)}`.trim());
+  /** Tells screen readers the value of a slider, instead of its position.
+   * @param {HTMLInputElement} slider @param {Row} row @param {ParameterValue} value @param {string} [part] */
+  describe(slider, row, value, part) {
+    slider.setAttribute("aria-valuetext", `${editable(value)} ${this.unit(row, part)}`.trim());
   }
 
   /** A row with three sliders and values; a planar scene uses two. @param {Row} row */
@@ -167,8 +170,7 @@ export class Panel {
   numberRow(row) {
     const { simulation } = this;
     const slider = make("input", { type: "range", min: 0, max: SLIDER_STEPS, id: `set-${row.name}` });
-    const shapes = simulation.scene?.shapes ?? [];
-    const parts = partsOf(row, shapes, KINDS);
+    const parts = partsOf(row, simulation.scene ?? NO_BENDS, KINDS);
     const options = [{ part: "all", text: "all" }, ...parts].map(({ part, text }) => make("option", { value: part }, text));
     const choice = make("select", { "aria-label": `${row.label}: ${row.parts === "blocks" ? "shape" : "constraint kind"}` }, ...options);
     const isOn = make("input", { type: "checkbox", "aria-label": `${row.label}: on` });
@@ -187,7 +189,7 @@ export class Panel {
       const isOff = typeof value !== "number" || (row.canBeOff && value === 0 && row.least === 0);
       // Each constraint or bend can have its own value.
       field.show(isOff ? null : value, row.parts === undefined ? "off" : "own");
-      this.describe(slider, row, isOff ? null : value);
+      this.describe(slider, row, isOff ? null : value, part());
     };
     slider.addEventListener("input", () => {
       const value = valueAt(row, range(), slider.valueAsNumber);

@@ -38,20 +38,24 @@ export const ROWS = [
   { name: "time_scale", label: "Speed", unit: "×", kind: "log", least: 0.01, most: 10 },
 ];
 
-/** The rows for a method; one about bends only if the scene has some. @param {string | null} method @param {boolean} hasBends */
+/** The bends of a scene, as its shapes tell. @typedef {{ shapes: { shape: string, has_bends?: boolean }[], hasExplicitBends: boolean }} Bends */
+
+/** The rows for a method; that of bends only if the scene has some. @param {string | null} method @param {boolean} hasBends */
 export const rowsOf = (method, hasBends) =>
   ROWS.filter((row) => (row.method === undefined || row.method === (method ?? "xpbd")) && (hasBends || row.parts !== "blocks"));
 
+/** Whether a scene has bends. @param {Bends} scene */
+export const hasBends = ({ shapes, hasExplicitBends }) => hasExplicitBends || shapes.some((shape) => shape.has_bends);
+
 /**
  * The parts of a row, with the texts that name them: none if a value for all says the same.
- * @param {Row} row @param {{ shape: string, has_bends?: boolean }[]} shapes of the scene @param {string[]} kinds of constraints
- * @returns {{ part: string, text: string }[]}
+ * @param {Row} row @param {Bends} scene @param {string[]} kinds of constraints @returns {{ part: string, text: string }[]}
  */
-export function partsOf(row, shapes, kinds) {
+export function partsOf(row, { shapes, hasExplicitBends }, kinds) {
   if (row.parts === "kinds") return kinds.map((part) => ({ part, text: part }));
   if (row.parts === undefined) return [];
   const blocks = shapes.flatMap((shape, block) => (shape.has_bends ? [{ part: String(block), text: `${block} ${shape.shape}` }] : []));
-  return blocks.length > 1 ? blocks : [];
+  return blocks.length > 1 || hasExplicitBends ? blocks : [];
 }
 
 /** The range of a row, wide enough for the initial and current values of the scene. @param {Row} row @param {...number} values */

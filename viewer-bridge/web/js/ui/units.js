@@ -15,12 +15,13 @@ export function unitsOf(length) {
   };
 }
 
-/** A unit given for metres, in another unit of length. @param {string} unit "m/s²", "kg/m³", "N", "N m" or "m/N" @param {string} length */
+/** A unit given for metres, in another unit of length. @param {string} unit "m/s²", "kg/m³", "N", "N m", "N m²" or "m/N" @param {string} length */
 export function unitIn(unit, length) {
   if (length === "m") return unit;
   const units = unitsOf(length);
   if (unit === "N") return units.force;
-  if (unit.startsWith("N m")) return unit.replace("N m", `${units.force} ${length}`);
+  // A rigidity: N is kg m/s².
+  if (unit === "N m" || unit === "N m²") return `kg ${length}${unit === "N m" ? "²" : "³"}/s²`;
   return unit === "m/N" ? units.compliance : unit.replace(/\bm(?=$|\/|³)/, length);
 }
 

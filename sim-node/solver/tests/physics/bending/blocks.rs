@@ -1,6 +1,9 @@
 //! A rigidity for one generated block: the bends of the block have it, and no others.
 
-use sim_solver::{BlockValue, Keyframe, ParameterValue, Particle, Reason, Scene, Solver};
+use sim_solver::{
+    Action, BlockValue, ConstraintKind, Keyframe, ParameterValue, Particle, Reason, Scene, Solver,
+};
+use sim_types::{KindFilter, Text};
 
 use crate::{bits, particles, step};
 
@@ -22,7 +25,7 @@ fn solver(text: &str) -> Solver {
 }
 
 fn set_block(solver: &mut Solver, block: u32, value: f32) -> Result<(), Reason> {
-    solver.set_for_block("bending", ParameterValue::Number(value), block)
+    solver.set_block_bending(block, value)
 }
 
 fn stepped(mut solver: Solver) -> Vec<u8> {
@@ -89,6 +92,21 @@ fn a_keyframe_has_the_rigidities_of_blocks_and_a_reset_ends_them() {
     step(&mut original, 20);
     assert!(bits(&copy) == bits(&original));
 
+    // Keyframes of version 3 have no blocks.
+    let plain = Solver::new(&scene).keyframe().encode();
+    let mut older = plain[..plain.len() - 1].to_vec();
+    older[..4].copy_from_slice(&3_u32.to_le_bytes());
+    assert_eq!(Keyframe::decode(&older).unwrap(), Keyframe::decode(&plain).unwrap());
+    copy.restore(
+        &particles(&Solver::new(&scene)).collect::<Vec<_>>(),
+        &Keyframe::decode(&older).unwrap(),
+    )
+    .unwrap();
+    set_block(&mut copy, 4, NEW).unwrap();
+    for wrong in [&plain[..plain.len() - 1], &[&older[..], &[0]].concat()] {
+        assert!(Keyframe::decode(wrong).is_err());
+    }
+
     // A scene with other blocks refuses the state.
     let text = SCENE.replace(LINES[2], "\n");
     let mut other = solver(&text);
@@ -108,9 +126,14 @@ fn a_wrong_block_is_refused() {
     assert_eq!(set_block(&mut refusing, 5, NEW), Err(Reason::OutOfRange));
     assert_eq!(set_block(&mut refusing, 0, -1.0), Err(Reason::OutOfRange));
     assert_eq!(set_block(&mut refusing, 0, f32::NAN), Err(Reason::NonFinite));
-    let off = refusing.set_for_block("bending", ParameterValue::Off, 0);
-    assert_eq!(off, Err(Reason::OutOfRange));
-    let damping = refusing.set_for_block("damping", ParameterValue::Number(1.0), 0);
-    assert_eq!(damping, Err(Reason::OutOfRange));
+    let mut apply = |name: &str, value, constraint_kind| {
+        let parameter = Text::new(name).unwrap();
+        refusing.apply(1, &Action::Set { parameter, value, constraint_kind, block: Some(0) })
+    };
+    let number = ParameterValue::Number(1.0);
+    assert_eq!(apply("bending", ParameterValue::Off, None), Err(Reason::OutOfRange));
+    assert_eq!(apply("damping", number, None), Err(Reason::OutOfRange));
+    let kind = Some(KindFilter::Known(ConstraintKind::Bend));
+    assert_eq!(apply("bending", number, kind), Err(Reason::OutOfRange));
     assert_eq!(refusing.parameter_values(), solver(SCENE).parameter_values());
 }
