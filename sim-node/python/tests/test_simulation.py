@@ -82,6 +82,32 @@ def test_the_energy_of_a_bend_follows_from_its_fields() -> None:
     assert energies.tolist() == [2 * 0.5 / 2]
 
 
+def test_a_hinge_has_no_energy_in_the_shape_in_which_it_rests() -> None:
+    simulation = catenary.Simulation(
+        toml="""
+        version = 1
+        [[generate]]
+        shape = "obj"
+        vertices = [[0, 0, 0.3], [0, 0, 0], [1, 0, 0], [0.2, 1, 0.1], [1.2, 1, -0.4]]
+        faces = [[0, 1, 2], [1, 3, 2], [2, 3, 4]]
+        bending = 2
+        rest = "loaded"
+        """
+    )
+    bends = simulation.bends()
+    assert [catenary.BEND_SHAPES[shape] for shape in bends.shapes] == ["hinge"] * 2
+    p = simulation.positions[bends.particles].astype(float)
+    curvature = (bends.coefficients[:, :, None] * p).sum(axis=1)
+    normals = [
+        np.cross(p[:, 2] - p[:, 1], p[:, 0] - p[:, 1]),
+        np.cross(p[:, 3] - p[:, 1], p[:, 2] - p[:, 1]),
+    ]
+    n = sum(normal / np.linalg.norm(normal, axis=1)[:, None] for normal in normals)
+    n /= np.linalg.norm(n, axis=1)[:, None]
+    assert np.abs(bends.rests).min() > 0.1
+    assert bends.rests[:, None] * n == pytest.approx(curvature, abs=1e-6)
+
+
 def test_the_bending_of_a_block_has_the_bits_of_a_node(start_node: StartNode) -> None:
     node = start_node("two-flags", "--paused")
     simulation = catenary.Simulation("two-flags")

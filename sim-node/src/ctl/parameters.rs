@@ -8,6 +8,10 @@ use crate::args::CtlArgs;
 use crate::output;
 use crate::table::{Align, Table};
 
+/// Key of the bending of blocks in JSON.
+const BY_BLOCK: &str = "bending_by_block";
+const BENDING: &str = "bending";
+
 /// Prints one parameter, or all of them.
 pub(super) fn print(
     client: &mut Client,
@@ -27,7 +31,9 @@ pub(super) fn print(
     if args.json {
         let mut object = Map::from_iter([("step".to_owned(), step.into())]);
         if let Value::Object(values) = serde_json::to_value(values)? {
-            object.extend(values.into_iter().filter(|(name, _)| is_asked(name)));
+            // Blocks have their values in a list of their own.
+            let is_value = |name: &str| is_asked(name) || name == BY_BLOCK && is_asked(BENDING);
+            object.extend(values.into_iter().filter(|(name, _)| is_value(name)));
         }
         return output::json(&Value::Object(object));
     }
