@@ -28,7 +28,7 @@ pub(super) struct Recording {
     stop: Stop,
 }
 
-/// What the messages of a load need besides its rows.
+/// Needs of the messages of a load besides its rows.
 #[derive(Debug)]
 struct Needs {
     /// Number of colliders. It never changes in a recording.

@@ -11,7 +11,7 @@ import { ValueField } from "./value-field.js";
 /** @typedef {import("./parameters.js").Row} Row */
 /** @typedef {import("../net/messages.js").ParameterValue} ParameterValue */
 
-/** What is known of the bends without a scene. @type {import("./parameters.js").Bends} */
+/** The bends of no scene. @type {import("./parameters.js").Bends} */
 const NO_BENDS = { shapes: [], hasExplicitBends: false };
 const AXES = ["x", "y", "z"];
 /** Wind drag set along with a wind velocity if there is none, as wind has no effect without drag: the default of scenes, in kg/m³. */

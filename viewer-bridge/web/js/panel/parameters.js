@@ -44,7 +44,7 @@ export const ROWS = [
 export const rowsOf = (method, hasBends) =>
   ROWS.filter((row) => (row.method === undefined || row.method === (method ?? "xpbd")) && (hasBends || row.parts !== "blocks"));
 
-/** Whether a scene has bends. @param {Bends} scene */
+/** True if a scene has bends. @param {Bends} scene */
 export const hasBends = ({ shapes, hasExplicitBends }) => hasExplicitBends || shapes.some((shape) => shape.has_bends);
 
 /**
