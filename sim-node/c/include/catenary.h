@@ -522,7 +522,7 @@ typedef struct {
   // 0 three particles on a line, 1 the corners of a cell, which it keeps from twisting, 2 a hinge: a third
   // corner, the ends of the edge, and the other third corner of two triangles.
   uint32_t shape;
-  // Index of the `[[generate]]` block that it comes from; -1 for an explicit bend.
+  // Index of the `[[generate]]` block that it comes from; -1 for an explicit bend, because 0 is a block.
   int32_t block;
 } catenary_bend_state;
 
