@@ -78,13 +78,15 @@ def receive(node, name, element, header):
     while sample is None:
         node.wait(iox2.Duration.from_millis(5))
         sample = subscriber.receive()
-    payload = sample.payload()
-    count = payload.len()
-    elements = (element * count).from_buffer_copy(payload.as_memory_view()) if count else []
     copied = header.from_buffer_copy(sample.user_header().contents)
+    payload = sample.payload()
+    # The length of a slice is in bytes in iceoryx2 0.10.0, so the header gives the count.
+    count = copied.particle_count if element is ParticleState else copied.count
+    array = element * count
+    elements = list(array.from_buffer_copy(array.from_address(payload.as_ptr())))
     # Destroyed in any other order, the ports leave a dead node behind.
     del payload, sample, subscriber, service
-    return copied, list(elements)
+    return copied, elements
 
 
 def main(prefix, root):
@@ -94,23 +96,22 @@ def main(prefix, root):
     node = iox2.NodeBuilder.new().config(config).create(iox2.ServiceType.Ipc)
     snapshot, particles = receive(node, "sim/particles", ParticleState, SnapshotHeader)
     tears, torn = receive(node, "sim/tears", TornConstraint, TearsHeader)
-    header, parameters = receive(node, "sim/parameters", ParameterState, ParametersHeader)
-    load, bends = receive(node, "sim/bends", BendState, LoadHeader)
+    _, parameters = receive(node, "sim/parameters", ParameterState, ParametersHeader)
+    _, bends = receive(node, "sim/bends", BendState, LoadHeader)
     report = {
         "contract_version": snapshot.contract_version,
         "step": snapshot.step,
         "particle_count": snapshot.particle_count,
         "first": [list(particle.position) for particle in particles[:3]],
-        # The header gives the count: a payload can be longer than its list.
-        "torn": [[one.constraint, one.cause] for one in torn[: tears.count]],
+        "torn": [[one.constraint, one.cause] for one in torn],
         "new_tears": tears.new_count,
         "parameters": [
             [one.parameter, one.constraint_kind, one.block, one.form, list(one.value)]
-            for one in parameters[: header.count]
+            for one in parameters
         ],
         "bends": [
             [list(one.particles), list(one.coefficients), one.rigidity, one.shape, one.block]
-            for one in bends[: load.count]
+            for one in bends
         ],
     }
     print(json.dumps(report))
