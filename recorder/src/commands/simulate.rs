@@ -64,7 +64,8 @@ pub(crate) struct SimulateArgs {
     #[arg(long, value_name = "INDEX", conflicts_with_all = ["steps", "commands"],
         allow_hyphen_values = true, value_parser = whole_number)]
     drop: Vec<u64>,
-    /// Change a parameter from this step of the recording on. Can be repeated
+    /// Change a parameter from this step of the recording on. Can be repeated. PARAMETER is that of `ctl set`, such as
+    /// damping, compliance.shear for one kind of constraint, or bending.1 for one generated block
     #[arg(long, value_name = "STEP:PARAMETER=VALUE", conflicts_with = "steps",
         allow_hyphen_values = true, value_parser = parse_setting)]
     set: Vec<TimedCommand>,

@@ -10,7 +10,7 @@ use recorder::{
     FrameReader, LogEnd, LogReader, Message, OutcomeRow, TimedCommand, parse_commands,
     scene_to_simulate, sort_commands,
 };
-use sim_contract::{Action, Parameter, ParameterValue, Reason, Stop, ValueForm};
+use sim_contract::{Action, KindFilter, Parameter, ParameterValue, Reason, Stop, ValueForm};
 use sim_solver::{Keyframe, Scene, Solver};
 
 use crate::input::command_source::{COMMANDS_MAX, timed_command};
@@ -25,10 +25,11 @@ pub(super) struct Changes {
     pub(super) replaced: Option<Vec<TimedCommand>>,
 }
 
-/// Parses `STEP:PARAMETER=VALUE`, such as `480:damping=0.1` or `0:gravity=[0,-5,0]`.
+/// Parses `STEP:PARAMETER=VALUE`, such as `480:damping=0.1` or `0:gravity=[0,-5,0]`. A parameter can be for one kind
+/// of constraint, such as `compliance.shear`, or for one generated block, such as `bending.1`.
 pub(super) fn parse_setting(text: &str) -> Result<TimedCommand, String> {
     const FORM: &str = "it must be STEP:PARAMETER=VALUE, such as 480:damping=0.1, \
-        480:gravity=[0,-5,0] or 480:max_speed=off";
+        480:gravity=[0,-5,0], 480:max_speed=off, 480:compliance.shear=1e-4 or 480:bending.1=1e-3";
     let (step, setting) = text.split_once(':').ok_or(FORM)?;
     let step: u64 = step.trim().parse().map_err(|_| FORM)?;
     let (parameter, value) = setting.split_once('=').ok_or(FORM)?;
@@ -36,9 +37,18 @@ pub(super) fn parse_setting(text: &str) -> Result<TimedCommand, String> {
         "off" => serde_json::Value::Null,
         value => serde_json::from_str(value).map_err(|_| FORM)?,
     };
-    let line = serde_json::json!({
-        "step": step, "kind": "set", "parameter": parameter.trim(), "value": value,
+    let (parameter, part) = match parameter.trim().split_once('.') {
+        None => (parameter.trim(), None),
+        Some((parameter, part)) => (parameter, Some(part)),
+    };
+    let mut line = serde_json::json!({
+        "step": step, "kind": "set", "parameter": parameter, "value": value,
     });
+    match part.map(|part| (part, part.parse::<u32>())) {
+        None => {}
+        Some((_, Ok(block))) => line["block"] = block.into(),
+        Some((kind, Err(_))) => line["constraint_kind"] = kind.into(),
+    }
     let commands = parse_commands(&line.to_string(), "--set").map_err(|error| error.to_string())?;
     let command = commands.into_iter().next().ok_or(FORM)?;
     match wrong_in_every_scene(&command.action) {
@@ -52,12 +62,20 @@ pub(super) fn parse_setting(text: &str) -> Result<TimedCommand, String> {
 
 /// Returns the reason for which every scene rejects a `set`. Others depend on the scene.
 fn wrong_in_every_scene(action: &Action) -> Option<Reason> {
-    let Action::Set { parameter, value, .. } = action else { return None };
+    let Action::Set { parameter, value, constraint_kind, block } = action else { return None };
     let Some(parameter) = Parameter::from_name(parameter.as_str()) else {
         return Some(Reason::UnknownParameter);
     };
-    let ParameterValue::Number(number) = *value else { return None };
     let info = parameter.info();
+    let has_part = match constraint_kind {
+        Some(KindFilter::Known(_)) => info.is_per_kind,
+        Some(KindFilter::Unknown) => false,
+        None => block.is_none() || parameter == Parameter::Bending,
+    };
+    if !has_part {
+        return Some(Reason::OutOfRange);
+    }
+    let ParameterValue::Number(number) = *value else { return None };
     let is_allowed = info.form != ValueForm::Vector && info.range.contains(number);
     (!is_allowed).then_some(Reason::OutOfRange)
 }
@@ -285,6 +303,8 @@ impl GivenStates {
 
 #[cfg(test)]
 mod tests {
+    use sim_contract::ConstraintKind;
+
     use super::*;
 
     #[test]
@@ -297,6 +317,21 @@ mod tests {
         }
         for text in ["damping=0.1", "x:damping=1", "3:damping", "3:damping=a", "-1:damping=1"] {
             assert!(parse_setting(text).unwrap_err().starts_with("it must be STEP:"), "{text}");
+        }
+        let part = |text: &str| match parse_setting(text).unwrap().action {
+            Action::Set { constraint_kind, block, .. } => (constraint_kind, block),
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(part("3:bending.12=1e-3"), (None, Some(12)));
+        let shear = KindFilter::Known(ConstraintKind::Shear);
+        assert_eq!(part("3:compliance.shear=1e-3"), (Some(shear), None));
+        for (text, allowed) in [
+            ("3:compliance.silk=1", "for one kind or all"),
+            ("3:damping.shear=1", "no kind"),
+            ("3:damping.1=1", "no block"),
+        ] {
+            let error = parse_setting(text).unwrap_err();
+            assert!(error.contains(allowed), "{error}");
         }
         let error = parse_setting("3:damping=[1]").unwrap_err();
         assert!(error.starts_with("--set:1: value: "), "{error}");
