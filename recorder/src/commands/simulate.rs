@@ -6,7 +6,7 @@ mod completion;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, bail};
+use anyhow::Context;
 use clap::error::ErrorKind;
 use recorder::simulation::{Job, SimulationResult, State, States, StepCount, simulate};
 use recorder::{
@@ -14,7 +14,7 @@ use recorder::{
 };
 use serde::Serialize;
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
-use sim_contract::{Outcome, Stop, printable_line};
+use sim_contract::{Action, Outcome, Reason, Stop, printable_line};
 use sim_solver::{Scene, Solver};
 
 use crate::cli::exit::{Exit, with_usage};
@@ -173,7 +173,9 @@ fn run_scene(args: &SimulateArgs, steps: u64, stop: &Stop) -> anyhow::Result<Exi
     let commands =
         args.commands.as_deref().map_or(Ok(Vec::new()), |source| load_commands(source, stop))?;
     let job = Job::new(scene, commands, steps);
-    check_command_steps(&job).with_context(|| args.commands.clone().unwrap_or_default())?;
+    if let (Some(warning), Some(source)) = (warning_of_late_commands(&job), &args.commands) {
+        output::note(&format!("warning: {}: {warning}", printable_line(source)));
+    }
     let solver = Solver::new(&job.scene);
     run_job(args, &job, States::first(solver), stop)
 }
@@ -224,26 +226,19 @@ impl SimulateArgs {
     }
 }
 
-/// Warns if some commands are for steps after the last one, and fails if all are.
-fn check_command_steps(job: &Job) -> anyhow::Result<()> {
-    let late_count = job.commands_beyond_the_end();
-    let (Some(first), Some(last)) = (job.commands.first(), job.commands.last()) else {
-        return Ok(());
+/// Returns a warning if commands are for steps after the last one.
+fn warning_of_late_commands(job: &Job) -> Option<String> {
+    let (late_count, steps) = (job.commands_beyond_the_end(), job.steps);
+    let last = job.commands.last().filter(|_| late_count > 0)?.step;
+    let commands = match (late_count, job.commands.len()) {
+        (1, 1) => "the only command is".to_owned(),
+        (1, _) => "1 command is".to_owned(),
+        (count, all) if count == all => format!("all {count} commands are"),
+        (count, _) => format!("{count} commands are"),
     };
-    let (first, last, steps) = (first.step, last.step, job.steps);
-    if late_count == job.commands.len() {
-        bail!(
-            "all {late_count} commands are for steps {first} to {last}, but the simulation ends at \
-             step {steps}. Use --steps {last} or more"
-        );
-    }
-    if late_count > 0 {
-        output::note(&format!(
-            "warning: {late_count} commands are for steps after {steps}, the last one. Use --steps \
-             {last} or more to apply all"
-        ));
-    }
-    Ok(())
+    Some(format!(
+        "{commands} for steps after {steps}, the last one. Use --steps {last} or more to apply all"
+    ))
 }
 
 /// Names the file that an error has left, if there is one.
@@ -303,9 +298,26 @@ fn note_incomplete_contacts(result: &SimulationResult) {
 /// Returns the reason of a rejection with its meaning and the allowed values.
 fn cause(outcome: &Outcome) -> String {
     let Some(reason) = outcome.reason() else { return outcome.reason_name().to_owned() };
-    let allowed = outcome.command.action().allowed_values(reason);
-    let allowed = allowed.map_or_else(String::new, |allowed| format!(" (allowed: {allowed})"));
-    format!("{}: {reason}{allowed}", reason.name())
+    let action = outcome.command.action();
+    let allowed = action.allowed_values(reason).map(|allowed| format!("allowed: {allowed}"));
+    let condition = || missing_condition(&action).map(str::to_owned);
+    let remedy = match reason {
+        Reason::NoEffectHere => condition(),
+        _ => allowed,
+    };
+    let remedy = remedy.map_or_else(String::new, |remedy| format!(" ({remedy})"));
+    format!("{}: {reason}{remedy}", reason.name())
+}
+
+/// Condition under which a command has an effect in a simulation.
+fn missing_condition(action: &Action) -> Option<&'static str> {
+    match action {
+        Action::Load { .. } => {
+            Some("a simulation has one scene; simulate the other one on its own")
+        }
+        Action::Restore { .. } => Some("only the commands of a recording have a state to restore"),
+        _ => action.missing_condition(),
+    }
 }
 
 /// The part of a summary that depends on the kind of simulation.
@@ -365,13 +377,14 @@ mod tests {
     }
 
     #[test]
-    fn commands_that_are_all_after_the_last_step_are_an_error() {
-        assert_eq!(
-            check_command_steps(&job(9)).unwrap_err().to_string(),
-            "all 2 commands are for steps 10 to 40, but the simulation ends at step 9. Use --steps \
-             40 or more"
-        );
-        assert!(check_command_steps(&job(10)).is_ok(), "some apply");
-        assert!(check_command_steps(&Job { commands: Vec::new(), ..job(9) }).is_ok());
+    fn commands_after_the_last_step_are_a_warning() {
+        let warning = |steps| warning_of_late_commands(&job(steps));
+        let all = "all 2 commands are for steps after 9, the last one. Use --steps 40 or more to apply all";
+        assert_eq!(warning(9).as_deref(), Some(all));
+        let one =
+            "1 command is for steps after 10, the last one. Use --steps 40 or more to apply all";
+        assert_eq!(warning(10).as_deref(), Some(one));
+        assert_eq!(warning(40), None);
+        assert_eq!(warning_of_late_commands(&Job { commands: Vec::new(), ..job(9) }), None);
     }
 }

@@ -56,6 +56,8 @@ const COMMON_FIELDS: [&str; 9] = [
 /// A line is not a command. The error names the line, the field and what is allowed.
 pub fn parse_commands(text: &str, label: &str) -> Result<Vec<TimedCommand>, CommandFileError> {
     let mut commands = Vec::new();
+    // Some editors begin a file with this mark.
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     for (line, text) in (1..).zip(text.lines()) {
         if text.trim().is_empty() {
             continue;
@@ -134,6 +136,10 @@ fn action(fields: &Map<String, Value>) -> Result<Action, FieldError> {
             }
             None => {}
         }
+    }
+    // Either of two fields must be present.
+    if row.kind == "rewind" && !own().any(|name| fields.contains_key(name)) {
+        return Err(missing("to_step", allowed_values(row.kind, "to_step")));
     }
     let own_fields =
         fields.iter().filter(|(name, _)| *name == "kind" || own().any(|own| own == *name));
@@ -252,6 +258,12 @@ mod tests {
     }
 
     #[test]
+    fn a_byte_order_mark_at_the_start_is_skipped() {
+        let text = "\u{feff}{\"step\":1,\"kind\":\"pause\"}\n";
+        assert_eq!(parse_commands(text, "x").unwrap()[0].action, Action::Pause);
+    }
+
+    #[test]
     fn a_line_of_a_log_is_a_command() {
         let line = r#"{"step":3,"client_id":7,"sequence":8,"index":0,"kind":"grab","particle":1,"target":["-inf",0.1,-0.0],"over_s":0.25,"status":"rejected","reason":"non_finite"}"#;
         let commands = parse_commands(line, "x").unwrap();
@@ -298,6 +310,7 @@ mod tests {
             r#"{"step":1,"kind":"set","parameter":7,"value":null}"#,
             r#"{"step":1,"kind":"set","parameter":"x","value":1,"constraint_kind":0}"#,
             r#"{"step":1,"kind":"set","parameter":"bending","value":1,"block":-1}"#,
+            r#"{"step":1,"kind":"rewind"}"#,
             r#"{"step":1,"kind":"load","scene":null}"#,
         ];
         let errors: Vec<_> = wrong.map(|line| error(&format!("\n{line}"))).into();
@@ -327,6 +340,7 @@ mod tests {
         drag.jsonl:2: parameter: 7 is invalid (allowed: the name of a parameter, at most 160 bytes)
         drag.jsonl:2: constraint_kind: 0 is invalid (allowed: structural, shear, bend or tether)
         drag.jsonl:2: block: -1 is invalid (allowed: whole numbers 0..=4294967295)
+        drag.jsonl:2: to_step: is missing (allowed: whole numbers from 0)
         drag.jsonl:2: scene: null is invalid (allowed: the name of a scene, at most 160 bytes)
         "#);
     }

@@ -74,7 +74,7 @@ pub use files::kind::kind_of_non_file;
 pub use files::part_file::error::{PartFileError, explain_write_error};
 pub use files::part_file::{Existing, PartFile, part_path};
 pub use files::place::is_being_written;
-pub use files::text_file::{TextFileError, read_scene_file};
+pub use files::text_file::{TextFileError, read_scene_file, to_text};
 pub use limits::*;
 pub use messages::collider::{ColliderState, CollidersHeader};
 pub use messages::command::{CONSOLE_CLIENT_ID, Command, CommandOptions};

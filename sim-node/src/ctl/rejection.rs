@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use sim_contract::{Action, Client, Outcome, Parameter, Reason, SnapshotHeader};
+use sim_contract::{Action, Client, Outcome, Reason, SnapshotHeader};
 use sim_solver::Scene;
 
 /// Explains a rejection: the meaning of its reason, and the remedy in parentheses where one is known.
@@ -142,19 +142,6 @@ fn fixed_remedy(action: &Action, reason: Reason) -> Option<String> {
 /// Condition under which a command has an effect.
 fn missing_condition(action: &Action) -> Option<&'static str> {
     Some(match action {
-        Action::Set { parameter, block: Some(_), .. }
-            if parameter.as_str() == Parameter::Bending.name() =>
-        {
-            "the block has no bends; a generated cloth, rope or mesh has them with the key bending"
-        }
-        Action::Set { parameter, .. } if parameter.as_str() == Parameter::Bending.name() => {
-            "the scene has no bends; a scene has them with the key bending of a generated cloth, rope or \
-             mesh, or with [[bend]]"
-        }
-        Action::Set { .. } => "method \"xpbd\" has compliance, method \"pbd\" has stiffness",
-        Action::DriveBody { .. } => {
-            "the collider is no body; the scene makes it one with body = { mass, inertia }"
-        }
         Action::Step { .. } => "the node runs; `ctl pause` pauses it",
         Action::Load { .. } => "it needs more memory than is available; see the node's messages",
         Action::Rewind { .. } => "the node keeps no history; start it without --history 0",
@@ -163,7 +150,7 @@ fn missing_condition(action: &Action) -> Option<&'static str> {
         | Action::Grab { .. }
         | Action::Move { .. }
         | Action::Release { .. } => "the particle is frozen; `ctl reset` restores it",
-        _ => return None,
+        _ => return action.missing_condition(),
     })
 }
 

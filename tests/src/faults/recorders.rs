@@ -21,13 +21,9 @@ const RECORDER_ENDS: Ends = Ends {
 };
 /// Ends of a playback.
 const PLAYER_ENDS: Ends = Ends { codes: &[0], errors: &[], needs_no_signal: true };
-/// Ends of a simulation. It refuses a recording that begins in the middle of a run, or whose commands are
-/// all later.
-const SIMULATION_ENDS: Ends = Ends {
-    codes: &[0],
-    errors: &["earlier commands of its run", "but the simulation ends at step"],
-    needs_no_signal: true,
-};
+/// Ends of a simulation. It refuses a recording that begins in the middle of a run.
+const SIMULATION_ENDS: Ends =
+    Ends { codes: &[0], errors: &["earlier commands of its run"], needs_no_signal: true };
 /// Ends of `info` and `verify`, which report losses.
 const REPORTS: Ends = Ends { codes: &[0, 3], errors: &[], needs_no_signal: true };
 /// Ends of `info` and `verify` for a file in which nothing was recorded.

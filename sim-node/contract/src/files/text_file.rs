@@ -25,8 +25,11 @@ pub enum TextFileError {
     #[error("it is longer than {SCENE_SIZE_BYTES_MAX} bytes")]
     TooLong,
     /// The file is not UTF-8.
-    #[error("it is not text in UTF-8")]
-    NotText,
+    #[error("line {line} is not text in UTF-8; save the file in this encoding")]
+    NotText {
+        /// The first such line, from 1.
+        line: usize,
+    },
 }
 
 /// Reads a scene, or a mesh that a scene names. Never waits, because it refuses FIFOs and devices.
@@ -57,7 +60,19 @@ fn read_bounded(file: File) -> Result<String, TextFileError> {
     if length > SCENE_SIZE_BYTES_MAX {
         return Err(TextFileError::TooLong);
     }
-    String::from_utf8(bytes).map_err(|_| TextFileError::NotText)
+    to_text(bytes)
+}
+
+/// Returns the text in the bytes of a file.
+///
+/// # Errors
+/// The bytes are not UTF-8.
+pub fn to_text(bytes: Vec<u8>) -> Result<String, TextFileError> {
+    String::from_utf8(bytes).map_err(|error| {
+        let valid = &error.as_bytes()[..error.utf8_error().valid_up_to()];
+        let line = valid.split(|byte| *byte == b'\n').count();
+        TextFileError::NotText { line }
+    })
 }
 
 #[cfg(test)]
@@ -116,8 +131,9 @@ mod tests {
         assert_eq!(error(&file.0), "it is longer than 16777216 bytes");
         handle.set_len(SCENE_SIZE_BYTES_MAX as u64).unwrap();
         assert_eq!(read_scene_file(&file.0).unwrap().len(), SCENE_SIZE_BYTES_MAX);
-        std::fs::write(&file.0, [0xff, 0xfe]).unwrap();
-        assert_eq!(error(&file.0), "it is not text in UTF-8");
+        std::fs::write(&file.0, b"version = 1\nname = 'caf\xe9'\n").unwrap();
+        let text = "line 2 is not text in UTF-8; save the file in this encoding";
+        assert_eq!(error(&file.0), text);
     }
 
     #[test]

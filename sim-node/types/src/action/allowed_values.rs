@@ -4,6 +4,7 @@ use crate::action::Action;
 use crate::limits::STEP_WORK_MAX;
 use crate::parameter::{OffMeaning, PARAMETERS, Parameter, ParameterInfo, ValueForm};
 use crate::reason::Reason;
+use crate::text::Text;
 
 impl ParameterInfo {
     /// Returns the allowed values in words.
@@ -33,6 +34,28 @@ impl Action {
             }
             Reason::NonFinite => Some("finite numbers".to_owned()),
             Reason::UnknownParameter => Some(PARAMETERS.map(|info| info.name).join(", ")),
+            _ => None,
+        }
+    }
+
+    /// Returns the condition of the scene under which this action has an effect, in words, if it was rejected
+    /// for having none.
+    pub fn missing_condition(&self) -> Option<&'static str> {
+        let is_bending = |parameter: &Text| parameter.as_str() == Parameter::Bending.name();
+        match self {
+            Self::Set { parameter, block: Some(_), .. } if is_bending(parameter) => Some(
+                "the block has no bends; a generated cloth, rope or mesh has them with the key bending",
+            ),
+            Self::Set { parameter, .. } if is_bending(parameter) => Some(
+                "the scene has no bends; a scene has them with the key bending of a generated cloth, rope or \
+                 mesh, or with [[bend]]",
+            ),
+            Self::Set { .. } => {
+                Some("method \"xpbd\" has compliance, method \"pbd\" has stiffness")
+            }
+            Self::DriveBody { .. } => Some(
+                "the collider is no body; the scene makes it one with body = { mass, inertia }",
+            ),
             _ => None,
         }
     }
