@@ -168,7 +168,7 @@ fn is_valid(kind: &str, name: &str, value: &Value) -> bool {
         "rotation" => are_numbers(4),
         "over_s" | "radius" | "limit" => is_number(value),
         "value" => value.is_null() || is_number(value) || are_numbers(3),
-        "constraint_kind" => value.is_string(),
+        "constraint_kind" => value.is_string() || value.is_null(),
         "force" if kind == "release" => value.is_boolean(),
         "target" | "center" | "delta" | "from" | "to" | "direction" | "translation"
         | "velocity" | "angular_velocity" | "force" | "torque" => are_numbers(3),
@@ -199,7 +199,7 @@ fn allowed_values(kind: &str, name: &str) -> &'static str {
         "to_step" => "whole numbers from 0",
         "contents" => "state or motion",
         "state_hash" => "16 hex digits in a string",
-        "constraint_kind" => "structural, shear, bend or tether",
+        "constraint_kind" => "structural, shear, bend, tether or all",
         "scene" => "the name of a scene, at most 160 bytes",
         "text" => "a text of at most 160 bytes",
         _ => "whole numbers 0..=4294967295",
@@ -338,7 +338,7 @@ mod tests {
         drag.jsonl:2: force: [0,1,2] is invalid (allowed: true or false)
         drag.jsonl:2: value: is missing (allowed: a number, three numbers, or null for off)
         drag.jsonl:2: parameter: 7 is invalid (allowed: the name of a parameter, at most 160 bytes)
-        drag.jsonl:2: constraint_kind: 0 is invalid (allowed: structural, shear, bend or tether)
+        drag.jsonl:2: constraint_kind: 0 is invalid (allowed: structural, shear, bend, tether or all)
         drag.jsonl:2: block: -1 is invalid (allowed: whole numbers 0..=4294967295)
         drag.jsonl:2: to_step: is missing (allowed: whole numbers from 0)
         drag.jsonl:2: scene: null is invalid (allowed: the name of a scene, at most 160 bytes)

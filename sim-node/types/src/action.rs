@@ -13,6 +13,7 @@ use crate::text::Text;
 
 pub use fields::ActionFields;
 pub use kind_filter::KindFilter;
+use kind_filter::kind_or_all;
 
 /// Default time in which a grabbed particle reaches its target, in seconds: one frame at 60 Hz.
 pub const GRAB_OVER_S_DEFAULT: f32 = 1.0 / 60.0;
@@ -143,7 +144,11 @@ pub enum Action {
         /// New value. null in JSON means off.
         value: ParameterValue,
         /// Kind of the affected constraints, for `compliance` and `stiffness`. `None` means all kinds.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[serde(
+            default,
+            deserialize_with = "kind_or_all",
+            skip_serializing_if = "Option::is_none"
+        )]
         constraint_kind: Option<KindFilter>,
         /// Index of the generated block of the affected bends, for `bending`. `None` means all bends.
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -455,6 +460,12 @@ mod tests {
         );
         let text = serde_json::to_string(&action).unwrap();
         assert!(text.ends_with(r#""constraint_kind":"unknown"}"#), "{text}");
+        for all in [r#""all""#, "null"] {
+            let text = format!(
+                r#"{{"kind":"set","parameter":"compliance","value":1,"constraint_kind":{all}}}"#
+            );
+            assert_eq!(read(&text), set("compliance", ParameterValue::Number(1.0), None));
+        }
     }
 
     #[test]

@@ -42,6 +42,17 @@ impl KindFilter {
     }
 }
 
+/// Name of all kinds, which is the same as none.
+const ALL: &str = "all";
+
+/// Reads the kind of a `set`: no name and "all" are all kinds.
+pub(crate) fn kind_or_all<'de, D: Deserializer<'de>>(
+    deserializer: D,
+) -> Result<Option<KindFilter>, D::Error> {
+    let name = Option::<String>::deserialize(deserializer)?;
+    Ok(name.filter(|name| name != ALL).map(|name| KindFilter::from_name(&name)))
+}
+
 impl Serialize for KindFilter {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.serialize_str(self.name())
