@@ -158,6 +158,38 @@ fn the_iceoryx2_python_package_reads_bends_and_the_bending_of_a_block() {
     }
 }
 
+/// A simulated and a live recording attach the mesh of the bust, named by the hash of its content.
+#[test]
+#[ignore = "needs Python"]
+fn the_stock_python_reader_finds_the_mesh_of_a_collider() {
+    let sandbox = Sandbox::new();
+    let (simulated, live) = (sandbox.path("simulated.mcap"), sandbox.path("live.mcap"));
+    let args = ["simulate", "covered-bust", "--steps", "1", "-o", &simulated];
+    Process::run(Program::Recorder, &sandbox, &args).success();
+    let node = Process::start_ready(Program::SimNode, &sandbox, &["run", "covered-bust"]);
+    let recording = record(&sandbox, &live);
+    recording.interrupt();
+    node.interrupt();
+    let scene = Scene::from_toml(builtin::text("covered-bust").unwrap(), "covered-bust").unwrap();
+    let meshes = scene.collider_meshes();
+    let mesh = meshes.values().next().unwrap();
+    for file in [simulated, live] {
+        let read = python(&sandbox, "read_attachments.py", &[&file]);
+        let attachments = read.as_object().unwrap();
+        assert_eq!(attachments.len(), 1 + meshes.len(), "{:?}", attachments.keys());
+        let (name, obj) = attachments.iter().find(|(name, _)| *name != "scene.toml").unwrap();
+        assert_eq!(*name, format!("{}.obj", obj["hash"].as_str().unwrap()));
+        let vertices: Vec<[f32; 3]> = serde_json::from_value(obj["vertices"].clone()).unwrap();
+        assert_eq!(vertices, mesh.vertices);
+        let faces: Vec<[u32; 3]> = serde_json::from_value(obj["faces"].clone()).unwrap();
+        let corners: Vec<_> =
+            mesh.triangles.iter().map(|one| one.map(|corner| corner + 1)).collect();
+        assert_eq!(faces, corners);
+        let verified = Process::run(Program::Recorder, &sandbox, &["verify", &file]).success();
+        assert!(!verified.contains("attachment"), "{verified}");
+    }
+}
+
 #[test]
 #[ignore = "needs Python"]
 fn a_client_that_knows_only_the_services_page_commands_a_node() {

@@ -11,6 +11,7 @@ use clap::error::ErrorKind;
 use recorder::simulation::{Job, SimulationResult, State, States, StepCount, simulate};
 use recorder::{
     Closing, ContentSelection, LogEnd, LogReader, OutcomeRow, PartFile, TimedCommand, WriteError,
+    mesh_files,
 };
 use serde::Serialize;
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
@@ -256,9 +257,11 @@ fn begin(args: &SimulateArgs, path: &Path, job: &Job, solver: &Solver) -> anyhow
     let file = args.file.create(path)?;
     let selection = ContentSelection::default();
     let selection = if args.forces { selection.with_forces() } else { selection };
-    args.file
-        .begin(file, selection, &job.description(solver), job.scene.to_toml().as_bytes())
-        .with_context(|| truncation(args))
+    let scene = job.scene.to_toml();
+    let log = args.file.begin(file, selection, &job.description(solver), scene.as_bytes());
+    let mut log = log.with_context(|| truncation(args))?;
+    log.attach_meshes(&mesh_files(&job.scene)).with_context(|| truncation(args))?;
+    Ok(log)
 }
 
 fn finish(log: LogFile, result: &SimulationResult, steps: u64) -> anyhow::Result<PathBuf> {

@@ -18,6 +18,7 @@ use super::run::{
     header_library,
 };
 use super::topic::{AllCounts, Topic};
+use crate::recorded_scene::mesh_files::MeshFile;
 use sink::{ChunkSink, SinkHandle};
 
 /// Bytes of an attachment to copy at a time.
@@ -242,6 +243,16 @@ impl<W: Write> LogWriter<W> {
         let metadata = Metadata { name: name.to_owned(), metadata: entries };
         let result = self.file.as_mut().ok_or(WriteError::Stopped)?.write_metadata(&metadata);
         self.stop_on_error(result)
+    }
+
+    /// Attaches the meshes of the scene as files.
+    ///
+    /// # Errors
+    /// If this or an earlier call failed.
+    pub fn attach_meshes(&mut self, files: &[MeshFile]) -> Result<(), WriteError> {
+        files.iter().try_for_each(|MeshFile { name, text }| {
+            self.attach(name, text.len() as u64, text.as_bytes())
+        })
     }
 
     /// Copies an attachment of `size_bytes` into the file. Readers of recordings skip it.

@@ -1,11 +1,13 @@
 //! The rows besides the snapshots: tears with their causes, colliders and events match the
 //! simulation, and a changed row is reported.
 
-use crate::log::{BendColumns, Message, TearsRow, TopologyRow};
+use crate::log::{BendColumns, LogOptions, LogReader, LogWriter, Message, TearsRow, TopologyRow};
+use crate::recorded_scene::mesh_files::mesh_files;
 use sim_contract::{BlockValue, ParticleFlags};
+use sim_solver::Scene;
 
 use super::commands::{COMMANDS, SCENE, STEPS, collect, job, job_of};
-use super::{check, rebuild, record};
+use super::{check, finish, rebuild, record};
 use crate::verification::Verdict;
 
 fn tears(file: &[u8]) -> Vec<TearsRow> {
@@ -282,4 +284,28 @@ fn the_bending_of_a_block_that_the_simulation_has_not_is_found() {
         assert!(report.to_string().contains(text), "{report}");
     }
     assert_eq!(with_blocks(&[of(0, 0.03)]).verdict, Verdict::Identical);
+}
+
+#[test]
+fn attached_meshes_are_compared_with_those_of_the_scene() {
+    let mesh = |x: f32| {
+        format!(
+            "version = 1\n[[particle]]\nposition = [0, 1, 0]\n[[collider]]\nshape = \"mesh\"\n\
+             vertices = [[{x}, 0, 0], [1, 0, 0], [0, 0, 1]]\nfaces = [[0, 1, 2]]\n"
+        )
+    };
+    let files = |x: f32| mesh_files(&Scene::from_toml(&mesh(x), "test").unwrap());
+    let (own, other) = (files(0.25), files(0.5));
+    let (file, _) = record(&job_of(&mesh(0.25), ""));
+    let mut old = LogReader::new(file.as_slice()).unwrap();
+    let (run, scene) = (old.run().clone(), old.scene().to_vec());
+    let mut new = LogWriter::create(Vec::new(), LogOptions::default(), &run, &scene, 0).unwrap();
+    new.attach_meshes(&[own.clone(), other.clone()].concat()).unwrap();
+    while let Some(logged) = old.next_message().unwrap() {
+        new.write(&logged.message, logged.log_time_ns).unwrap();
+    }
+    let report = check(&finish(new, 0)).0;
+    assert_eq!(report.verdict, Verdict::Identical, "{report}");
+    let text = report.not_covered.join("\n");
+    assert!(text.contains(&other[0].name) && !text.contains(&own[0].name), "{text}");
 }

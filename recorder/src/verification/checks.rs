@@ -19,6 +19,7 @@ use super::read_ahead::{ReadAhead, ReadFrame};
 use super::resimulation::{Resimulation, ResimulationError};
 use super::snapshot_numbers::SnapshotNumbers;
 use crate::recorded_scene::RecordedSceneError;
+use crate::recorded_scene::mesh_files::mesh_files;
 use crate::simulation::frozen::FrozenParticles;
 use crate::simulation::run_id::RunId;
 
@@ -327,6 +328,12 @@ impl Verification {
             self.simulation.as_ref().map_or(0, Resimulation::earlier_count);
         self.coverage.given_count = self.simulation.as_ref().map_or(0, Resimulation::given_count);
         self.coverage.foreign.clone_from(&self.frames.seen.foreign);
+        if !self.frames.seen.mesh_files.is_empty() {
+            let own = mesh_files(&self.scene);
+            let is_other = |name: &&String| own.iter().all(|file| file.name != **name);
+            let others = self.frames.seen.mesh_files.iter().filter(is_other);
+            self.coverage.foreign.extend(others.map(|name| format!("attachment '{name}'")));
+        }
     }
 
     /// Returns the steps whose states could not be simulated.

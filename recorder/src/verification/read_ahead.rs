@@ -42,6 +42,8 @@ pub(super) struct Seen {
     pub(super) newer_topic: Option<Topic>,
     /// Names of content of other programs.
     pub(super) foreign: Vec<String>,
+    /// Names of attached meshes.
+    pub(super) mesh_files: Vec<String>,
     /// Number of messages that no snapshot follows yet.
     pub(super) trailing_count: usize,
 }
@@ -50,6 +52,7 @@ impl Seen {
     fn new<R: Read>(frames: &FrameReader<R>) -> Self {
         let log = frames.log();
         let foreign = log.audit().into_iter().flat_map(crate::log::Audit::foreign);
+        let mesh_files = log.audit().into_iter().flat_map(crate::log::Audit::mesh_files);
         let trailing_row = usize::from(frames.trailing_row().is_some());
         Self {
             intact_count: log.intact_count(),
@@ -58,6 +61,7 @@ impl Seen {
             difference: log.audit().and_then(|audit| audit.difference().cloned()),
             newer_topic: log.newer_topic(),
             foreign: foreign.map(ToOwned::to_owned).collect(),
+            mesh_files: mesh_files.map(ToOwned::to_owned).collect(),
             trailing_count: frames.trailing_updates().len() + trailing_row,
         }
     }

@@ -1,6 +1,8 @@
 //! The load of a recording.
 
-use recorder::{Message, RunDescription, SurfaceRow, TopologyRow};
+use std::sync::Arc;
+
+use recorder::{MeshFile, Message, RunDescription, SurfaceRow, TopologyRow, mesh_files};
 use sim_contract::clock::{monotonic_ns, realtime_ns};
 use sim_contract::{LoadHeader, LoadedScene, SnapshotHeader};
 use sim_solver::{Scene, SceneError};
@@ -11,6 +13,8 @@ pub(crate) struct RunHeader {
     pub(crate) run: RunDescription,
     /// The scene as TOML.
     pub(crate) scene: Vec<u8>,
+    /// The meshes of the colliders, as files.
+    pub(crate) meshes: Arc<[MeshFile]>,
     /// The rows of the load.
     pub(crate) rows: Vec<Message>,
 }
@@ -46,6 +50,7 @@ pub(crate) struct Load {
     header: LoadHeader,
     scene: Scene,
     text: Vec<u8>,
+    meshes: Arc<[MeshFile]>,
     topology: TopologyRow,
     surface: SurfaceRow,
     /// Wall clock of step 0, in nanoseconds since 1970.
@@ -55,9 +60,11 @@ pub(crate) struct Load {
 impl Load {
     pub(crate) fn new(loaded: &LoadedScene) -> Result<Self, LoadError> {
         let text = std::str::from_utf8(&loaded.scene).map_err(|_| LoadError::NotText)?;
+        let scene = Scene::from_toml(text, "scene.toml")?;
         Ok(Self {
             header: loaded.header,
-            scene: Scene::from_toml(text, "scene.toml")?,
+            meshes: mesh_files(&scene).into(),
+            scene,
             text: loaded.scene.clone(),
             topology: TopologyRow::new(&loaded.header, &loaded.constraints, &loaded.bends),
             surface: SurfaceRow::new(&loaded.header, &loaded.triangles),
@@ -100,6 +107,7 @@ impl Load {
         };
         let topology = TopologyRow { torn, ..self.topology.clone() };
         let rows = vec![Message::Topology(topology), Message::Surface(self.surface.clone())];
-        RunHeader { run, scene: self.text.clone(), rows }
+        let meshes = Arc::clone(&self.meshes);
+        RunHeader { run, scene: self.text.clone(), meshes, rows }
     }
 }

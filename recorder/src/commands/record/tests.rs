@@ -94,7 +94,15 @@ fn keyframe(index: u32) -> Content {
 
 fn begun_queue(limit_bytes: usize) -> Queue {
     let queue = Queue::new(limit_bytes);
-    queue.begin(RunHeader { run: description(), scene: SCENE.to_vec(), rows: Vec::new() }, 0);
+    queue.begin(
+        RunHeader {
+            run: description(),
+            scene: SCENE.to_vec(),
+            meshes: [].into(),
+            rows: Vec::new(),
+        },
+        0,
+    );
     queue
 }
 

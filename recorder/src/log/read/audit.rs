@@ -15,6 +15,7 @@ use crate::log::run::{
     header_library,
 };
 use crate::log::topic::{AllCounts, Topic};
+use crate::recorded_scene::mesh_files::mesh_file_name;
 
 /// Most names of foreign content to keep.
 const FOREIGN_MAX: usize = 16;
@@ -35,6 +36,8 @@ pub struct Audit {
     difference: Option<AuditDifference>,
     /// Content of other programs, which is not compared.
     foreign: BTreeSet<String>,
+    /// Names of attached meshes with the content that they name.
+    mesh_files: BTreeSet<String>,
     encoder: MessageEncoder,
     /// The recording has forces.
     has_forces: bool,
@@ -93,6 +96,12 @@ impl Audit {
         self.difference.get_or_insert(AuditDifference { step, what });
     }
 
+    /// Returns the names of the attached meshes so far whose content has the hash in its name. They may belong to
+    /// another scene.
+    pub fn mesh_files(&self) -> impl Iterator<Item = &str> {
+        self.mesh_files.iter().map(String::as_str)
+    }
+
     fn add_foreign(&mut self, name: String) {
         if self.foreign.len() < FOREIGN_MAX {
             self.foreign.insert(name);
@@ -136,8 +145,13 @@ impl Audit {
         }
     }
 
-    pub(super) fn add_attachment(&mut self, name: &str) {
-        self.add_foreign(format!("attachment '{name}'"));
+    pub(super) fn add_attachment(&mut self, name: &str, content: &[u8]) {
+        let is_mesh = name == mesh_file_name(content);
+        if is_mesh && self.mesh_files.len() < FOREIGN_MAX {
+            self.mesh_files.insert(name.to_owned());
+        } else {
+            self.add_foreign(format!("attachment '{name}'"));
+        }
     }
 
     pub(super) fn add_metadata(&mut self, name: &str) {

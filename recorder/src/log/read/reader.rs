@@ -304,9 +304,9 @@ impl Content<'_> {
                     audit.add_metadata(&metadata.name);
                 }
             }
-            Record::Attachment { header, .. } => {
+            Record::Attachment { header, data, .. } => {
                 if let Some(audit) = self.audit {
-                    audit.add_attachment(&header.name);
+                    audit.add_attachment(&header.name, &data);
                 }
             }
             Record::Message { header, data } => return self.read_message(&header, &data, byte),
