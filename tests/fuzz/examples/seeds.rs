@@ -95,7 +95,7 @@ fn write_keyframes(scene: u8, path: &Path) -> Result<()> {
     let mut frames = FrameReader::new(LogReader::open(path)?);
     while let Some(frame) = frames.next_frame()? {
         if let Some(keyframe) = frame.own_keyframe() {
-            let particles = bytemuck::cast_slice(&frame.particles);
+            let particles = bytemuck::cast_slice(frame.payload());
             let seed = [&[scene][..], particles, keyframe].concat();
             write("keyframe", &format!("{scene}-{}", frame.row.step), &seed)?;
         }
