@@ -447,7 +447,7 @@ impl Check {
                 );
                 self.findings.add_index(end, "metadata 'recorder'", what);
             }
-            let is_counted = topic != Topic::Tf || content.counts_transforms();
+            let is_counted = topic != Topic::Tf || content.has_channels_of_today();
             if is_counted && claimed.written != counted.written {
                 let what = format!(
                     "it counts {} messages on {name}, but the file has {}",

@@ -71,12 +71,7 @@ pub(super) struct ContentCheck {
 const CHANNELS_VERSION: u32 = 5;
 
 impl ContentCheck {
-    /// Returns `true` if the recorder that wrote the file counts /tf, which belongs to the header.
-    pub(super) fn counts_transforms(&self) -> bool {
-        self.format_version >= CHANNELS_VERSION
-    }
-
-    /// Returns `true` if the file has the channels of a file of today.
+    /// Returns `true` if the file has the channels of a file of today, and counts /tf, which belongs to the header.
     pub(super) fn has_channels_of_today(&self) -> bool {
         self.format_version >= CHANNELS_VERSION
     }

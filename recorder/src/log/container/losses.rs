@@ -168,7 +168,7 @@ impl Losses {
             if self.has_any {
                 self.counts[topic].lost = self.counts[topic].lost.max(more);
             }
-            let is_counted = topic != Topic::Tf || content.counts_transforms();
+            let is_counted = topic != Topic::Tf || content.has_channels_of_today();
             counts.written = if is_counted { content.counts[topic].written } else { 0 };
             if !had_end {
                 counts.received = counts.written.saturating_add(counts.lost);
