@@ -17,14 +17,14 @@ mod surfaces;
 mod tile;
 mod tile_tree;
 
-use box_tree::{Search, pair_order};
+use box_tree::Search;
 pub(crate) use load::CONNECTED_REACH;
 use load::{LaneMasks, LoadPairs};
 use order::{order_by_key, order_key};
 use pair::Pair;
 use surfaces::{SurfaceContacts, SurfaceSearch};
-use tile::{TILE, TILE_LENGTH, take_lowest};
-use tile_tree::{Query, TileTree};
+use tile::{TILE, TILE_LENGTH, members, take_lowest};
+use tile_tree::{Query, TileTree, search_order};
 
 use crate::kernels::Kernels;
 use crate::kernels::lanes::PackedParticle;
@@ -160,7 +160,7 @@ impl ParticleContacts {
         let slots = self.locations.iter_mut().zip(&self.particles);
         for (slot, (location, particle)) in (0_u32..).zip(slots) {
             *location = store.location(*particle);
-            store.set_tile(&mut self.paths, *location, slot / TILE_LENGTH);
+            store.set_slot(&mut self.paths, *location, slot);
         }
     }
 
@@ -178,8 +178,8 @@ impl ParticleContacts {
         friction: f32,
     ) {
         self.find_strays(store, substep);
-        let has_stray = self.tree.has_stray.contains(&true);
-        let are_loaded = has_stray && self.find_candidates(store, substep);
+        let are_all_on_paths = self.tree.strays.iter().all(|lanes| *lanes == 0);
+        let are_loaded = !are_all_on_paths && self.find_candidates(store, substep);
         if !are_loaded && self.surfaces.has_candidates() {
             // They may come to other triangles.
             self.load_all(store);
@@ -225,23 +225,22 @@ impl ParticleContacts {
         }
     }
 
-    /// Finds the tiles with particles that are not where the candidates expect them at the end of the substep.
+    /// Finds the particles that are not where the candidates expect them at the end of the substep.
     fn find_strays(&mut self, store: &ParticleStore, substep: Substep) {
-        let has_stray = &mut self.tree.has_stray;
-        let Some(begin) = self.paths_begin_at else { return has_stray.fill(true) };
-        has_stray.fill(false);
+        let Some(begin) = self.paths_begin_at else { return self.tree.mark_all() };
+        self.tree.strays.fill(0);
         let count = (substep.index - begin.index + 1) as f32;
         // Less than half of the margin for each particle, so that rounding loses no pair.
         let limit = 0.24 * self.margin * self.margin;
-        store.mark_strays(&self.paths, Progress { count, limit }, has_stray);
+        store.mark_strays(&self.paths, Progress { count, limit }, &mut self.tree.strays);
     }
 
-    /// Finds the candidates in tiles with strays for the rest of the step, and orders all. Returns true if it has loaded
+    /// Finds the candidates of strays for the rest of the step, and orders all. Returns true if it has loaded
     /// all particles.
     fn find_candidates(&mut self, store: &ParticleStore, substep: Substep) -> bool {
-        let stray_count = self.tree.has_stray.iter().filter(|has_stray| **has_stray).count();
+        let stray_count = self.tree.strays.iter().filter(|lanes| **lanes != 0).count();
         let are_few = (stray_count as f32) < STRAY_PART_MAX * self.tree.tiles.len() as f32;
-        // An incomplete search has left out candidates of tiles without strays.
+        // An incomplete search has left out candidates of others.
         let is_partial = are_few && self.is_complete;
         let begin = self.paths_begin_at.filter(|_| is_partial);
         let passed = if let Some(begin) = begin {
@@ -274,33 +273,32 @@ impl ParticleContacts {
         self.paths_begin_at = Some(substep);
         store.save_paths(&mut self.paths);
         self.load_all(store);
-        self.tree.has_stray.fill(true);
-        self.tree.follow_strays(&self.states, 0.0, store.kernels());
+        self.tree.begin_paths(&self.states, store.kernels());
         if self.surfaces.are_on() {
             self.expected.copy_from_slice(&self.states);
         }
         self.candidates.clear();
     }
 
-    /// Gives the particles in tiles with strays the paths that they take after this number of displacements, and drops
-    /// their candidates. Those of the others still hold.
+    /// Gives the strays the paths that they take after this number of displacements, and drops their candidates. Those of
+    /// the others still hold.
     fn follow_strays(&mut self, store: &ParticleStore, passed: f32) {
         let Self { tree, states, candidates, locations, paths, surfaces, expected, .. } = self;
-        for slot in tree.slots_with_strays() {
+        for slot in members(&tree.strays).map(|slot| slot as usize) {
             states[slot] = store.packed_particle(locations[slot]);
         }
-        tree.follow_strays(states, passed, store.kernels());
-        for slot in tree.slots_with_strays() {
+        tree.follow_strays(states, passed);
+        for slot in members(&tree.strays).map(|slot| slot as usize) {
             let path = tree.tiles[slot / TILE].particle(slot % TILE);
             store.set_saved_path(paths, locations[slot], path);
         }
         if surfaces.are_on() {
             tree.place(passed, store.kernels(), expected);
         }
-        candidates.retain(|pair| !pair.tiles().iter().any(|tile| tree.has_stray[*tile as usize]));
+        candidates.retain(|pair| !pair.slots.iter().any(|slot| tree.is_stray(*slot)));
     }
 
-    /// Adds the candidates in tiles with strays, in the order of the search.
+    /// Adds the candidates of strays, in the order of the search.
     fn search(&mut self, query: Query, kernels: Kernels) -> Search {
         let Self { tree, states, particles, load_pairs, loose, candidates, .. } = self;
         let (thickness, count_max) = (self.thickness, self.pair_count_max);
@@ -333,8 +331,7 @@ impl ParticleContacts {
         found
     }
 
-    /// Merges the candidates behind the first ones into these. Both are in the order of the search, and no pair of tiles
-    /// is in both.
+    /// Merges the candidates behind the first ones into these. Both are in the order of the search.
     fn merge_candidates(&mut self, kept_count: usize) {
         if kept_count == 0 {
             return;
@@ -344,8 +341,8 @@ impl ParticleContacts {
         let (kept, found) = candidates.split_at(kept_count);
         let mut kept = kept.iter().peekable();
         for pair in found {
-            let order = pair_order(pair.tiles());
-            while let Some(earlier) = kept.next_if(|kept| pair_order(kept.tiles()) < order) {
+            let order = search_order(pair.slots);
+            while let Some(earlier) = kept.next_if(|kept| search_order(kept.slots) < order) {
                 ordered.push(*earlier);
             }
             ordered.push(*pair);

@@ -2,19 +2,19 @@
 
 use crate::kernels::lanes::{LaneWork, PackedParticle, Wide, axes};
 
-/// Where the path of every particle begins, its displacement in a substep, and its tile.
+/// Where the path of every particle begins, its displacement in a substep, and its slot.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Paths {
     /// By rows of the store.
     pub(super) in_rows: Vec<Vec<f32>>,
     pub(super) graph: Vec<PackedParticle>,
-    /// The tile of every particle, in the same order.
-    pub(super) tiles_in_rows: Vec<Vec<u32>>,
-    pub(super) tiles_of_graph: Vec<u32>,
+    /// The slot of every particle, in the same order.
+    pub(super) slots_in_rows: Vec<Vec<u32>>,
+    pub(super) slots_of_graph: Vec<u32>,
 }
 
-/// The tile of a particle without contacts. It is beyond all tiles, so its path is compared but not noted.
-pub(super) const NO_TILE: u32 = u32::MAX;
+/// The slot of a particle without contacts. It is beyond all slots, so its path is compared but not noted.
+pub(super) const NO_SLOT: u32 = u32::MAX;
 
 /// The elapsed part of the paths, and how far a particle may be beside its own.
 #[derive(Debug, Clone, Copy)]
@@ -40,13 +40,13 @@ impl Progress {
     }
 }
 
-/// Marks the tile of each lane whose bit is set.
+/// Sets the bits of the slots of the lanes whose bits are set. `strays` has one for each of sixteen slots.
 #[inline(always)]
-pub(super) fn mark_tiles(mut lanes: u32, tiles: &[u32; 8], has_stray: &mut [bool]) {
+pub(super) fn mark_strays(mut lanes: u32, slots: &[u32; 8], strays: &mut [u16]) {
     while lanes != 0 {
-        let tile = tiles[lanes.trailing_zeros() as usize];
-        if let Some(has_stray) = has_stray.get_mut(tile as usize) {
-            *has_stray = true;
+        let slot = slots[lanes.trailing_zeros() as usize];
+        if let Some(strays) = strays.get_mut((slot / u16::BITS) as usize) {
+            *strays |= 1 << (slot % u16::BITS);
         }
         lanes &= lanes - 1;
     }
@@ -56,9 +56,9 @@ pub(super) fn mark_tiles(mut lanes: u32, tiles: &[u32; 8], has_stray: &mut [bool
 pub(super) struct GraphWork<'a> {
     pub(super) now: &'a [PackedParticle],
     pub(super) saved: &'a [PackedParticle],
-    pub(super) tiles: &'a [u32],
+    pub(super) slots: &'a [u32],
     pub(super) progress: Progress,
-    pub(super) has_stray: &'a mut [bool],
+    pub(super) strays: &'a mut [u16],
 }
 
 impl LaneWork for GraphWork<'_> {
@@ -66,19 +66,19 @@ impl LaneWork for GraphWork<'_> {
 
     #[inline(always)]
     fn run<W: Wide>(self) {
-        let Self { now, saved, tiles, progress, has_stray } = self;
+        let Self { now, saved, slots, progress, strays } = self;
         let (now, now_rest) = now.as_chunks();
         let (saved, saved_rest) = saved.as_chunks();
-        let (tiles, tiles_rest) = tiles.as_chunks();
-        for ((now, saved), tiles) in now.iter().zip(saved).zip(tiles) {
-            mark_tiles(beside::<W>(now, saved, progress), tiles, has_stray);
+        let (slots, slots_rest) = slots.as_chunks();
+        for ((now, saved), slots) in now.iter().zip(saved).zip(slots) {
+            mark_strays(beside::<W>(now, saved, progress), slots, strays);
         }
         let mut last = [[PackedParticle::default(); 8]; 2];
         last[0][..now_rest.len()].copy_from_slice(now_rest);
         last[1][..saved_rest.len()].copy_from_slice(saved_rest);
-        let mut last_tiles = [NO_TILE; 8];
-        last_tiles[..tiles_rest.len()].copy_from_slice(tiles_rest);
-        mark_tiles(beside::<W>(&last[0], &last[1], progress), &last_tiles, has_stray);
+        let mut last_slots = [NO_SLOT; 8];
+        last_slots[..slots_rest.len()].copy_from_slice(slots_rest);
+        mark_strays(beside::<W>(&last[0], &last[1], progress), &last_slots, strays);
     }
 }
 

@@ -1,6 +1,6 @@
 //! Follows all particles along their paths, and finds those that have left theirs.
 
-use super::paths::{GraphWork, NO_TILE, Paths, Progress};
+use super::paths::{GraphWork, NO_SLOT, Paths, Progress};
 use super::rows::Rows;
 use super::{Location, ParticleStore};
 use crate::kernels::lanes::PackedParticle;
@@ -32,32 +32,33 @@ impl ParticleStore {
         }
     }
 
-    /// Makes room for the paths of all particles, none of which has a tile.
+    /// Makes room for the paths of all particles, none of which has a slot.
     pub(crate) fn prepare_paths(&self, paths: &mut Paths) {
         self.save_paths(paths);
-        paths.tiles_in_rows = self.all_rows().map(Rows::no_tiles).collect();
-        paths.tiles_of_graph = vec![NO_TILE; paths.graph.len()];
+        paths.slots_in_rows = self.all_rows().map(Rows::no_slots).collect();
+        paths.slots_of_graph = vec![NO_SLOT; paths.graph.len()];
     }
 
-    /// Sets the tile of one particle.
-    pub(crate) fn set_tile(&self, paths: &mut Paths, location: Location, tile: u32) {
+    /// Sets the slot of one particle.
+    pub(crate) fn set_slot(&self, paths: &mut Paths, location: Location, slot: u32) {
         let index = location.index();
         if let (Some(rows), Some(number)) = (self.rows(location), location.rows()) {
-            rows.set_tile(&mut paths.tiles_in_rows[number], index, tile);
+            rows.set_slot(&mut paths.slots_in_rows[number], index, slot);
         } else {
-            paths.tiles_of_graph[index] = tile;
+            paths.slots_of_graph[index] = slot;
         }
     }
 
-    /// Marks the tiles of particles that are not where their paths lead. NaN is beside no path.
-    pub(crate) fn mark_strays(&self, paths: &Paths, progress: Progress, has_stray: &mut [bool]) {
+    /// Marks the particles that are not where their paths lead: `strays` has a bit for each of sixteen slots. NaN is
+    /// beside no path.
+    pub(crate) fn mark_strays(&self, paths: &Paths, progress: Progress, strays: &mut [u16]) {
         let kernels = self.kernels();
         let (now, saved) = (self.graph.packed_particles(), paths.graph.as_slice());
-        let tiles = paths.tiles_of_graph.as_slice();
-        kernels.run(GraphWork { now, saved, tiles, progress, has_stray: &mut *has_stray });
-        let saved = paths.in_rows.iter().zip(&paths.tiles_in_rows);
-        for (rows, (saved, tiles)) in self.all_rows().zip(saved) {
-            kernels.run(rows.stray_work(saved, tiles, progress, &mut *has_stray));
+        let slots = paths.slots_of_graph.as_slice();
+        kernels.run(GraphWork { now, saved, slots, progress, strays: &mut *strays });
+        let saved = paths.in_rows.iter().zip(&paths.slots_in_rows);
+        for (rows, (saved, slots)) in self.all_rows().zip(saved) {
+            kernels.run(rows.stray_work(saved, slots, progress, &mut *strays));
         }
     }
 }

@@ -80,9 +80,11 @@ impl BoxTree {
     }
 
     /// Marks leaves, and no others.
-    pub(super) fn mark(&mut self, is_marked: &[bool]) {
+    pub(super) fn mark(&mut self, is_marked: impl Iterator<Item = bool>) {
         let Some((leaves, nodes)) = self.is_marked.split_first_mut() else { return };
-        leaves.copy_from_slice(is_marked);
+        for (leaf, is_marked) in leaves.iter_mut().zip(is_marked) {
+            *leaf = is_marked;
+        }
         let mut below = &*leaves;
         for level in nodes {
             for (node, children) in level.iter_mut().zip(below.chunks(ARITY)) {
@@ -319,7 +321,7 @@ mod tests {
         let near = |[a, b]: [u32; 2]| if b + 1 == count { a == b } else { b - a <= 6 };
         let pairs = || (0..count).flat_map(|a| (a..count).map(move |b| [a, b]));
         for kernels in Kernels::available() {
-            tree.mark(&vec![true; count as usize]);
+            tree.mark((0..count).map(|_| true));
             let all = found(&tree, kernels);
             assert!(all.is_sorted_by(|a, b| pair_order(*a) < pair_order(*b)), "{kernels:?}");
             let mut sorted = all.clone();
@@ -327,7 +329,7 @@ mod tests {
             assert_eq!(sorted, pairs().filter(|pair| near(*pair)).collect::<Vec<_>>());
 
             let is_marked: Vec<_> = (0..count).map(|leaf| leaf % 50 == 3).collect();
-            tree.mark(&is_marked);
+            tree.mark(is_marked.iter().copied());
             let has_mark = |pair: &[u32; 2]| pair.iter().any(|leaf| is_marked[*leaf as usize]);
             let marked: Vec<_> = all.into_iter().filter(has_mark).collect();
             assert_eq!(found(&tree, kernels), marked, "{kernels:?}");
@@ -348,8 +350,8 @@ mod tests {
                     [(long, marks[0]), (short, marks[1])].map(|(count, every)| {
                         (0..count).map(|leaf| leaf % every == 3 % every).collect::<Vec<_>>()
                     });
-                left.mark(&in_left);
-                right.mark(&in_right);
+                left.mark(in_left.iter().copied());
+                right.mark(in_right.iter().copied());
                 let mut found = Vec::new();
                 let search = left.search_between(&right, (0.0, kernels), &mut |pair| {
                     found.push(pair);

@@ -1,7 +1,6 @@
 //! The law of a contact between two particles.
 
 use super::push::Push;
-use super::tile::TILE_LENGTH;
 use crate::kernels::lanes::{PackedParticle, axes, map_axes};
 use crate::kernels::vectors::dot;
 
@@ -16,12 +15,6 @@ pub(super) struct Pair {
 }
 
 impl Pair {
-    /// The tiles of both particles.
-    #[inline(always)]
-    pub(super) fn tiles(&self) -> [u32; 2] {
-        self.slots.map(|slot| slot / TILE_LENGTH)
-    }
-
     /// Returns true if the ends of the paths are nearer than `factor` times the contact distance.
     #[inline(always)]
     pub(super) fn is_near(&self, particles: &[PackedParticle], factor: f32) -> bool {

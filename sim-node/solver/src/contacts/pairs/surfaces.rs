@@ -17,7 +17,7 @@ mod triangle_tiles;
 use super::box_tree::Search;
 use super::load::{self, LoadPairs};
 use super::order::{order_by_key, order_key};
-use super::tile::{TILE, TILE_LENGTH};
+use super::tile::TILE;
 use super::tile_tree::TileTree;
 use crate::kernels::Kernels;
 use crate::kernels::lanes::PackedParticle;
@@ -111,7 +111,7 @@ impl SurfaceContacts {
         self.near.iter().flat_map(|contact| contact.slots)
     }
 
-    /// Finds the candidates in tiles with strays, and orders all. Breaks if there are too many.
+    /// Finds the candidates of strays, and orders all. Breaks if there are too many.
     pub(super) fn find(&mut self, search: &SurfaceSearch<'_>) -> Search {
         self.tiles.refit(&self.surface, search);
         self.keep_candidates(search);
@@ -147,17 +147,17 @@ impl SurfaceContacts {
         found
     }
 
-    /// Keeps the candidates whose particle and triangle are in tiles without strays. The search finds the others.
+    /// Keeps the candidates without strays. The search finds the others.
     ///
-    /// The triangle is the one on the paths, as in the search: where the particle is now, it may be another one, and so
-    /// in a tile that the search leaves out, or finds again.
+    /// The triangle is the one on the paths, as in the search: where the particle is now, it may be another one, which the
+    /// search leaves out, or finds again.
     fn keep_candidates(&mut self, search: &SurfaceSearch<'_>) {
         let Self { surface, tiles, load_pairs, candidates, newest, ordered, .. } = self;
         candidates.clear();
         newest.fill(None);
         for candidate in ordered.iter() {
             let slot = candidate.slot;
-            if search.tree.has_stray[(slot / TILE_LENGTH) as usize] {
+            if search.tree.is_stray(slot) {
                 continue;
             }
             let view = View { particles: search.states, slot, time: 0.0 };
@@ -165,7 +165,7 @@ impl SurfaceContacts {
             let is_known = has_candidate(candidates, newest[slot as usize], |known| {
                 surface.shares(triangle, nearest.feature, known)
             });
-            if !is_known && !tiles.has_stray_near(triangle) {
+            if !is_known && !tiles.has_stray(triangle) {
                 let never_touches = load_pairs.never_touch(slot, triangle);
                 let kept = Candidate { triangle, never_touches, ..*candidate };
                 add_candidate(candidates, newest, kept);

@@ -47,16 +47,15 @@ impl Tile {
         ]
     }
 
-    /// Replaces the paths by those on which the particles are now, after `time` displacements.
+    /// Replaces all paths by those that begin now.
     #[inline(always)]
-    pub(super) fn follow<W: Wide>(&mut self, states: &[PackedParticle; TILE], time: f32) {
+    pub(super) fn begin<W: Wide>(&mut self, states: &[PackedParticle; TILE]) {
         let (groups, _) = states.as_chunks();
         for (group, states) in groups.iter().enumerate() {
             let [[x, y, z, _], [dx, dy, dz, _]] = W::columns(states);
             let (x, d) = ([x, y, z], [dx, dy, dz]);
             for axis in 0..3 {
-                let start = x[axis] - W::splat(time) * d[axis];
-                start.store(&mut self.x[axis][group], 0);
+                x[axis].store(&mut self.x[axis][group], 0);
                 d[axis].store(&mut self.d[axis][group], 0);
             }
         }
@@ -132,6 +131,21 @@ fn bounds_of<W: Wide>([x, y, z]: &[TileColumn; 3]) -> Bounds {
         bounds.include([W::load(&x[group], 0), W::load(&y[group], 0), W::load(&z[group], 0)]);
     }
     bounds.around_all()
+}
+
+/// Sets the bits of `count` members of tiles.
+pub(super) fn mark_all(lanes: &mut [u16], count: usize) {
+    for (tile, lanes) in lanes.iter_mut().enumerate() {
+        *lanes = !0 >> (TILE - (count - TILE * tile).min(TILE));
+    }
+}
+
+/// The members of tiles whose bits are set, ascending.
+pub(super) fn members(lanes: &[u16]) -> impl Iterator<Item = u32> + '_ {
+    (0_u32..).zip(lanes).flat_map(|(tile, lanes)| {
+        let mut lanes = u32::from(*lanes);
+        std::iter::from_fn(move || Some(TILE_LENGTH * tile + take_lowest(&mut lanes)?))
+    })
 }
 
 /// Removes the lowest bit that is set, and returns its place.

@@ -3,8 +3,8 @@
 //! Sixteen particles that are neighbours at load form a tile. The tree above the tiles keeps its form from load
 //! to load: only the boxes follow the particles.
 
-use super::box_tree::{BoxTree, Search};
-use super::tile::{TILE, TILE_LENGTH, Tile, coordinates, take_lowest};
+use super::box_tree::{BoxTree, Search, pair_order};
+use super::tile::{TILE, TILE_LENGTH, Tile, coordinates, mark_all, members, take_lowest};
 use crate::contacts::bounds::Bounds;
 use crate::kernels::Kernels;
 use crate::kernels::lanes::{LaneWork, PackedParticle, Wide, axes};
@@ -24,8 +24,8 @@ pub(super) struct TileTree {
     starts: Vec<Bounds>,
     /// Boxes of the displacements of the tiles.
     pub(super) displacements: Vec<Bounds>,
-    /// By tile: a particle has left its path since the last search. All have at first.
-    pub(super) has_stray: Vec<bool>,
+    /// By tile: a bit for each particle that has left its path since the last search. All have at first.
+    pub(super) strays: Vec<u16>,
     particle_count: usize,
     /// Pairs of tiles that are near each other, to be examined.
     tile_pairs: Vec<[u32; 2]>,
@@ -38,9 +38,12 @@ impl TileTree {
         let (starts, displacements) =
             (vec![Bounds::EMPTY; tiles.len()], vec![Bounds::EMPTY; tiles.len()]);
         let boxes = BoxTree::new(tiles.len());
-        let has_stray = vec![true; tiles.len()];
         let tile_pairs = Vec::with_capacity(TILE_PAIRS_MAX);
-        Self { tiles, boxes, starts, displacements, has_stray, particle_count: count, tile_pairs }
+        let strays = vec![0; tiles.len()];
+        let mut tree =
+            Self { tiles, boxes, starts, displacements, strays, particle_count: count, tile_pairs };
+        tree.mark_all();
+        tree
     }
 
     /// Makes a tree of particles at rest where they are at load.
@@ -54,17 +57,29 @@ impl TileTree {
         tree
     }
 
-    /// The slots of the particles in tiles with strays.
-    pub(super) fn slots_with_strays(&self) -> impl Iterator<Item = usize> + '_ {
-        let tiles = self.has_stray.iter().enumerate().filter(|(_, has_stray)| **has_stray);
-        tiles.flat_map(|(tile, _)| TILE * tile..self.particle_count.min(TILE * (tile + 1)))
+    pub(super) fn is_stray(&self, slot: u32) -> bool {
+        self.strays[(slot / TILE_LENGTH) as usize] & (1 << (slot % TILE_LENGTH)) != 0
     }
 
-    /// Replaces the paths in tiles with strays by those on which the particles are now, after `time` displacements.
-    pub(super) fn follow_strays(&mut self, states: &[PackedParticle], time: f32, kernels: Kernels) {
+    /// Makes all particles strays.
+    pub(super) fn mark_all(&mut self) {
+        mark_all(&mut self.strays, self.particle_count);
+    }
+
+    /// Gives all particles the paths that begin now. They are strays to the next search.
+    pub(super) fn begin_paths(&mut self, states: &[PackedParticle], kernels: Kernels) {
         let (states, _) = states.as_chunks();
-        let Self { tiles, has_stray, .. } = self;
-        kernels.run(FollowWork { tiles, states, time, has_stray });
+        kernels.run(BeginWork { tiles: &mut self.tiles, states });
+        self.mark_all();
+    }
+
+    /// Replaces the paths of strays by those on which they are now, after `time` displacements.
+    pub(super) fn follow_strays(&mut self, states: &[PackedParticle], time: f32) {
+        for slot in members(&self.strays).map(|slot| slot as usize) {
+            let PackedParticle([x, y, z, _, dx, dy, dz, _]) = states[slot];
+            let start = [x - time * dx, y - time * dy, z - time * dz];
+            self.tiles[slot / TILE].set(slot % TILE, start, [dx, dy, dz]);
+        }
     }
 
     /// Replaces states by those on the paths after `time` displacements. Masses stay.
@@ -75,13 +90,13 @@ impl TileTree {
 
     /// Recomputes the boxes of tiles with strays for a part of the paths: from and to these numbers of displacements.
     pub(super) fn refit(&mut self, times: [f32; 2], kernels: Kernels) {
-        let Self { tiles, boxes, starts, displacements, has_stray, .. } = self;
-        kernels.run(BoundsWork { tiles, has_stray, starts, displacements });
-        boxes.mark(has_stray);
+        let Self { tiles, boxes, starts, displacements, strays, .. } = self;
+        kernels.run(BoundsWork { tiles, strays, starts, displacements });
+        boxes.mark(strays.iter().map(|lanes| *lanes != 0));
         boxes.refit(|leaves| {
             let bounds = leaves.iter_mut().zip(starts.iter().zip(displacements.iter()));
-            for ((leaf, (start, displacement)), has_stray) in bounds.zip(has_stray) {
-                if *has_stray {
+            for ((leaf, (start, displacement)), strays) in bounds.zip(strays) {
+                if *strays != 0 {
                     let [from, to] = times.map(|time| start.moved(displacement, time));
                     *leaf = from.union(&to);
                 }
@@ -96,8 +111,8 @@ impl TileTree {
     }
 
     /// Passes every pair of particles whose straight paths come nearer than the query's distance to
-    /// `accept`, as slots in ascending order, if the tile of one of them has strays. The order of two pairs depends
-    /// only on the tree, not on the other pairs. `except` leaves pairs out: for two tiles, it has a bit for each
+    /// `accept`, as slots in ascending order, if one of them is a stray. The order of two pairs depends only on the
+    /// tree, not on the other pairs ([`search_order`]). `except` leaves pairs out: for two tiles, it has a bit for each
     /// particle of the second one that a particle of the first one leaves out.
     pub(super) fn search(
         &mut self,
@@ -127,24 +142,19 @@ impl TileTree {
     }
 }
 
-/// Gives the particles of tiles the paths on which they are.
-struct FollowWork<'a> {
+/// Gives the particles of tiles the paths that begin now.
+struct BeginWork<'a> {
     tiles: &'a mut [Tile],
     states: &'a [[PackedParticle; TILE]],
-    time: f32,
-    has_stray: &'a [bool],
 }
 
-impl LaneWork for FollowWork<'_> {
+impl LaneWork for BeginWork<'_> {
     type Output = ();
 
     #[inline(always)]
     fn run<W: Wide>(self) {
-        let tiles = self.tiles.iter_mut().zip(self.states).zip(self.has_stray);
-        for ((tile, states), has_stray) in tiles {
-            if *has_stray {
-                tile.follow::<W>(states, self.time);
-            }
+        for (tile, states) in self.tiles.iter_mut().zip(self.states) {
+            tile.begin::<W>(states);
         }
     }
 }
@@ -170,7 +180,7 @@ impl LaneWork for PlaceWork<'_> {
 /// Computes the boxes of positions and displacements of the tiles with strays.
 struct BoundsWork<'a> {
     tiles: &'a [Tile],
-    has_stray: &'a [bool],
+    strays: &'a [u16],
     starts: &'a mut [Bounds],
     displacements: &'a mut [Bounds],
 }
@@ -180,15 +190,21 @@ impl LaneWork for BoundsWork<'_> {
 
     #[inline(always)]
     fn run<W: Wide>(self) {
-        let Self { tiles, has_stray, starts, displacements } = self;
+        let Self { tiles, strays, starts, displacements } = self;
         let boxes = starts.iter_mut().zip(displacements);
-        for ((tile, has_stray), (start, displacement)) in tiles.iter().zip(has_stray).zip(boxes) {
-            if *has_stray {
+        for ((tile, strays), (start, displacement)) in tiles.iter().zip(strays).zip(boxes) {
+            if *strays != 0 {
                 *start = tile.starts::<W>();
                 *displacement = tile.displacements::<W>();
             }
         }
     }
+}
+
+/// A value that ascends over the pairs of slots of [`TileTree::search`].
+#[inline(always)]
+pub(super) fn search_order(slots: [u32; 2]) -> (u64, [u32; 2]) {
+    (pair_order(slots.map(|slot| slot / TILE_LENGTH)), slots)
 }
 
 /// Condition of [`TileTree::search`].
@@ -219,7 +235,11 @@ impl<E: Fn([u32; 2]) -> [u16; TILE], F: FnMut([u32; 2]) -> Search> LaneWork
         for &[a, b] in pairs {
             let pair = TilePair::<W>::new(tree, [a, b], query);
             let [from, to] = query.times;
+            let strays = [a, b].map(|tile| u32::from(tree.strays[tile as usize]));
             let mut lanes = pair.lanes_near_box(&tree.bounds_at(b, 0.5 * (from + to)));
+            if strays[1] == 0 {
+                lanes &= strays[0];
+            }
             if lanes == 0 {
                 continue;
             }
@@ -231,6 +251,9 @@ impl<E: Fn([u32; 2]) -> [u16; TILE], F: FnMut([u32; 2]) -> Search> LaneWork
                     near &= (!0_u32 << lane) << 1;
                 }
                 near &= !u32::from(left_out[lane as usize]);
+                if strays[0] & (1 << lane) == 0 {
+                    near &= strays[1];
+                }
                 let slot = TILE_LENGTH * a + lane;
                 let mut near = pair.lanes_coming_near(lane as usize, near);
                 while let Some(other) = take_lowest(&mut near) {

@@ -2,7 +2,7 @@
 
 use super::Rows;
 use crate::kernels::lanes::{LaneWork, Wide, axes, lane_groups};
-use crate::store::paths::{NO_TILE, Progress, mark_tiles};
+use crate::store::paths::{NO_SLOT, Progress, mark_strays};
 
 /// Saved fields of a row: position and displacement.
 const SAVED_FIELDS: usize = 6;
@@ -30,35 +30,35 @@ impl Rows {
         }
     }
 
-    /// Places for the tiles of all particles.
-    pub(crate) fn no_tiles(&self) -> Vec<u32> {
-        vec![NO_TILE; self.layout.rows * self.layout.stride]
+    /// Places for the slots of all particles.
+    pub(crate) fn no_slots(&self) -> Vec<u32> {
+        vec![NO_SLOT; self.layout.rows * self.layout.stride]
     }
 
-    /// Sets the tile of a particle.
-    pub(crate) fn set_tile(&self, tiles: &mut [u32], index: usize, tile: u32) {
+    /// Sets the slot of a particle.
+    pub(crate) fn set_slot(&self, slots: &mut [u32], index: usize, slot: u32) {
         let (stride, length) = (self.layout.stride, self.layout.length);
-        tiles[index / length * stride + index % length] = tile;
+        slots[index / length * stride + index % length] = slot;
     }
 
-    /// Compares the particles with saved paths. Marks the tiles of those that are beside theirs.
+    /// Compares the particles with saved paths. Marks those that are beside theirs.
     pub(crate) fn stray_work<'a>(
         &'a self,
         saved: &'a [f32],
-        tiles: &'a [u32],
+        slots: &'a [u32],
         progress: Progress,
-        has_stray: &'a mut [bool],
+        strays: &'a mut [u16],
     ) -> impl LaneWork<Output = ()> + 'a {
-        StrayWork { rows: self, saved, tiles, progress, has_stray }
+        StrayWork { rows: self, saved, slots, progress, strays }
     }
 }
 
 struct StrayWork<'a> {
     rows: &'a Rows,
     saved: &'a [f32],
-    tiles: &'a [u32],
+    slots: &'a [u32],
     progress: Progress,
-    has_stray: &'a mut [bool],
+    strays: &'a mut [u16],
 }
 
 impl LaneWork for StrayWork<'_> {
@@ -71,12 +71,12 @@ impl LaneWork for StrayWork<'_> {
         let numbers: &[f32] = self.rows.numbers();
         let rows = numbers.chunks_exact(layout.length);
         let saved = self.saved.chunks_exact(SAVED_FIELDS * stride);
-        for ((row, saved), tiles) in rows.zip(saved).zip(self.tiles.chunks_exact(stride)) {
+        for ((row, saved), slots) in rows.zip(saved).zip(self.slots.chunks_exact(stride)) {
             let x = axes(|axis| lane_groups(row, axis * stride, count));
             let d = axes(|axis| lane_groups(row, (DISPLACEMENT_AT + axis) * stride, count));
             let saved_x = axes(|axis| lane_groups(saved, axis * stride, count));
             let saved_d = axes(|axis| lane_groups(saved, (3 + axis) * stride, count));
-            let (tiles, _) = tiles.as_chunks();
+            let (slots, _) = slots.as_chunks();
             for group in 0..count {
                 let now = [
                     axes(|axis| W::load(&x[axis][group], 0)),
@@ -87,7 +87,7 @@ impl LaneWork for StrayWork<'_> {
                     axes(|axis| W::load(&saved_d[axis][group], 0)),
                 ];
                 let lanes = W::bits(self.progress.beside(now, saved));
-                mark_tiles(lanes, &tiles[group], self.has_stray);
+                mark_strays(lanes, &slots[group], self.strays);
             }
         }
     }

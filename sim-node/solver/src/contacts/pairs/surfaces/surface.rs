@@ -122,7 +122,7 @@ impl Surface {
     }
 
     /// Returns the whole triangles around a slot.
-    fn fan(&self, slot: u32) -> impl Iterator<Item = u32> + '_ {
+    pub(super) fn fan(&self, slot: u32) -> impl Iterator<Item = u32> + '_ {
         let [first, end] = [slot, slot + 1].map(|slot| self.fan_starts[slot as usize] as usize);
         self.fans[first..end].iter().copied().filter(|triangle| self.is_whole(*triangle))
     }

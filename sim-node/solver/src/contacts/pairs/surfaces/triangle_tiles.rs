@@ -1,7 +1,9 @@
 //! Tiles of triangles, to find those that particles come near.
 
 use super::super::box_tree::{BoxTree, Search};
-use super::super::tile::{TILE, TILE_LENGTH, coordinates, lanes_in_box, take_lowest};
+use super::super::tile::{
+    TILE, TILE_LENGTH, coordinates, lanes_in_box, mark_all, members, take_lowest,
+};
 use super::super::tile_tree::TileTree;
 use super::placed_tile::PlacedTile;
 use super::surface::Surface;
@@ -21,12 +23,8 @@ const TILE_PAIRS_MAX: usize = 4096;
 pub(super) struct TriangleTiles {
     tiles: Vec<TriangleTile>,
     boxes: BoxTree,
-    /// By tile: first entry in `particle_tiles`, and the end of the last one.
-    starts: Vec<u32>,
-    /// By tile: the tiles of the particles at its corners.
-    particle_tiles: Vec<u32>,
-    /// By tile: a particle at a corner is in a tile with strays.
-    has_stray: Vec<bool>,
+    /// By tile: a bit for each triangle with a stray at a corner.
+    strays: Vec<u16>,
     /// Where the triangles of each tile are, if the running search has needed it.
     placed: Vec<PlacedTile>,
     /// Tiles of particles and of triangles that are near each other, to be examined.
@@ -36,57 +34,46 @@ pub(super) struct TriangleTiles {
 impl TriangleTiles {
     pub(super) fn new(surface: &Surface) -> Self {
         let count = surface.corners.len().div_ceil(TILE);
-        let mut tiles = Self {
+        Self {
             tiles: vec![TriangleTile::EMPTY; count],
             boxes: BoxTree::new(count),
-            starts: Vec::with_capacity(count + 1),
-            has_stray: vec![true; count],
+            strays: vec![0; count],
             placed: vec![PlacedTile::default(); count],
             tile_pairs: Vec::with_capacity(TILE_PAIRS_MAX),
-            ..Self::default()
-        };
-        tiles.enter_particle_tiles(surface);
-        tiles
-    }
-
-    #[allow(clippy::cast_possible_truncation, reason = "at most 3 for each of 2^24 triangles")]
-    fn enter_particle_tiles(&mut self, surface: &Surface) {
-        for triangles in surface.corners.chunks(TILE) {
-            self.starts.push(self.particle_tiles.len() as u32);
-            let mut tiles: Vec<_> =
-                triangles.iter().flatten().map(|slot| slot / TILE_LENGTH).collect();
-            tiles.sort_unstable();
-            tiles.dedup();
-            self.particle_tiles.extend(tiles);
         }
-        self.starts.push(self.particle_tiles.len() as u32);
     }
 
-    /// True if a corner of the tile of a triangle may have left its path since the last search.
-    pub(super) fn has_stray_near(&self, triangle: u32) -> bool {
-        self.has_stray[(triangle / TILE_LENGTH) as usize]
+    /// True if a corner of a triangle has left its path since the last search.
+    pub(super) fn has_stray(&self, triangle: u32) -> bool {
+        self.strays[(triangle / TILE_LENGTH) as usize] & (1 << (triangle % TILE_LENGTH)) != 0
     }
 
     /// Replaces the spheres and boxes of tiles with strays by those of their paths.
     pub(super) fn refit(&mut self, surface: &Surface, search: &SurfaceSearch<'_>) {
-        self.mark(&search.tree.has_stray);
-        let Self { tiles, boxes, has_stray, .. } = self;
+        self.mark_strays(surface, search);
+        let Self { tiles, boxes, strays, .. } = self;
+        boxes.mark(strays.iter().map(|lanes| *lanes != 0));
         boxes.refit(|leaves| {
-            search.kernels.run(RefitWork { tiles, leaves, has_stray, surface, search });
+            search.kernels.run(RefitWork { tiles, leaves, strays, surface, search });
         });
     }
 
-    /// Marks tiles at whose corners a tile of particles has strays.
-    fn mark(&mut self, has_stray: &[bool]) {
-        for (is_marked, range) in self.has_stray.iter_mut().zip(self.starts.windows(2)) {
-            let particle_tiles = &self.particle_tiles[range[0] as usize..range[1] as usize];
-            *is_marked = particle_tiles.iter().any(|tile| has_stray[*tile as usize]);
+    /// Marks the triangles with strays at their corners.
+    fn mark_strays(&mut self, surface: &Surface, search: &SurfaceSearch<'_>) {
+        if search.passed == 0.0 {
+            // The paths of all particles begin now.
+            return mark_all(&mut self.strays, surface.corners.len());
         }
-        self.boxes.mark(&self.has_stray);
+        self.strays.fill(0);
+        for slot in members(&search.tree.strays) {
+            for triangle in surface.fan(slot) {
+                self.strays[(triangle / TILE_LENGTH) as usize] |= 1 << (triangle % TILE_LENGTH);
+            }
+        }
     }
 
-    /// Passes every particle and triangle to `accept` that may come nearer than the distance of the search, if one of
-    /// their tiles has strays. `except` has, for a tile of particles and one of triangles, a bit for each triangle
+    /// Passes every particle and triangle to `accept` that may come nearer than the distance of the search, if there is a
+    /// stray among the particle and the corners of the triangle. `except` has, for a tile of particles and one of triangles, a bit for each triangle
     /// that a particle leaves out.
     pub(super) fn search(
         &mut self,
@@ -95,11 +82,13 @@ impl TriangleTiles {
         except: &impl Fn([u32; 2]) -> [u16; TILE],
         accept: &mut impl FnMut([u32; 2]) -> Search,
     ) -> Search {
-        let Self { tiles, boxes, placed, tile_pairs, .. } = self;
+        let Self { tiles, boxes, strays, placed, tile_pairs } = self;
+        let strays = &*strays;
         placed.iter_mut().for_each(PlacedTile::clear);
         let mut examine = |pairs: &mut Vec<[u32; 2]>| {
             let (tiles, placed, accept) = (&mut *tiles, &mut *placed, &mut *accept);
-            let work = SearchWork { tiles, placed, pairs, search, surface, wanted, except, accept };
+            let work =
+                SearchWork { tiles, strays, placed, pairs, search, surface, wanted, except, accept };
             let found = search.kernels.run(work);
             pairs.clear();
             found
@@ -149,7 +138,7 @@ pub(in super::super) struct SurfaceSearch<'a> {
 struct RefitWork<'a> {
     tiles: &'a mut [TriangleTile],
     leaves: &'a mut [Bounds],
-    has_stray: &'a [bool],
+    strays: &'a [u16],
     surface: &'a Surface,
     search: &'a SurfaceSearch<'a>,
 }
@@ -159,14 +148,14 @@ impl LaneWork for RefitWork<'_> {
 
     #[inline(always)]
     fn run<W: Wide>(self) {
-        let Self { tiles, leaves, has_stray, surface, search } = self;
+        let Self { tiles, leaves, strays, surface, search } = self;
         let half = 0.5 * search.span;
-        let leaves = leaves.iter_mut().zip(has_stray);
+        let leaves = leaves.iter_mut().zip(strays);
         let triangles = surface.corners.chunks(TILE);
-        for ((tile, (leaf, has_stray)), triangles) in tiles.iter_mut().zip(leaves).zip(triangles) {
+        for ((tile, (leaf, strays)), triangles) in tiles.iter_mut().zip(leaves).zip(triangles) {
             // The boxes of the others still hold, because they were made for a longer time.
-            tile.is_fitted = *has_stray;
-            if *has_stray {
+            tile.is_fitted = *strays != 0;
+            if tile.is_fitted {
                 tile.refit::<W>(triangles, search.states, half);
                 *leaf = tile.path_box(half);
             }
@@ -177,6 +166,7 @@ impl LaneWork for RefitWork<'_> {
 /// Examines pairs of a tile of particles and a tile of triangles.
 struct SearchWork<'a, E, F> {
     tiles: &'a mut [TriangleTile],
+    strays: &'a [u16],
     placed: &'a mut [PlacedTile],
     pairs: &'a [[u32; 2]],
     search: &'a SurfaceSearch<'a>,
@@ -193,7 +183,7 @@ impl<E: Fn([u32; 2]) -> [u16; TILE], F: FnMut([u32; 2]) -> Search> LaneWork
 
     #[inline(always)]
     fn run<W: Wide>(self) -> Search {
-        let Self { tiles, placed, pairs, search, surface, wanted, except, accept } = self;
+        let Self { tiles, strays, placed, pairs, search, surface, wanted, except, accept } = self;
         let SurfaceSearch { tree, states, passed, span, distance, .. } = *search;
         let half = 0.5 * span;
         let middle_time = passed + half;
@@ -209,6 +199,11 @@ impl<E: Fn([u32; 2]) -> [u16; TILE], F: FnMut([u32; 2]) -> Search> LaneWork
             let reach = axes(|axis| distance + half * relative[axis]);
             let middles = tile.positions::<W>(middle_time);
             let mut lanes = lanes_in_box(&middles, &triangles.bounds.grown_by(reach));
+            let [stray_lanes, stray_triangles] =
+                [tree.strays[left as usize], strays[right as usize]].map(u32::from);
+            if stray_triangles == 0 {
+                lanes &= stray_lanes;
+            }
             if lanes == 0 {
                 continue;
             }
@@ -216,8 +211,10 @@ impl<E: Fn([u32; 2]) -> [u16; TILE], F: FnMut([u32; 2]) -> Search> LaneWork
             let spheres = triangles.grown::<W>(distance + half * dot(relative, relative).sqrt());
             let [x, y, z] = coordinates(&middles);
             while let Some(lane) = take_lowest(&mut lanes) {
+                let is_stray = stray_lanes & (1 << lane) != 0;
                 let (slot, lane) = (TILE_LENGTH * left + lane, lane as usize);
-                let mut near = !u32::from(left_out[lane]) & ALL_LANES;
+                let wanted_lanes = if is_stray { ALL_LANES } else { stray_triangles };
+                let mut near = !u32::from(left_out[lane]) & wanted_lanes;
                 if near != 0 {
                     near &= spheres.lanes_around([x[lane], y[lane], z[lane]]);
                 }
