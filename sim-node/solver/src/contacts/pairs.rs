@@ -43,6 +43,9 @@ const REACH: f32 = 1.1;
 const PARTICLES_MARGIN: f32 = 0.25;
 /// The same where cloths touch as surfaces. There, bits depend on when candidates are found, and so on this margin.
 const SURFACES_MARGIN: f32 = 0.3;
+/// Part of the distance from its path that a particle may have. Those beyond it get new paths with the ones that are too
+/// far away: they would soon be, too.
+const STRAY_FROM: f32 = 0.5;
 /// Part of the tiles with strays from which on all paths begin anew: a full search is then as fast.
 const STRAY_PART_MAX: f32 = 0.5;
 /// Largest number of candidates for each particle, on average. It bounds the time of a step in which
@@ -177,9 +180,7 @@ impl ParticleContacts {
         substep: Substep,
         friction: f32,
     ) {
-        self.find_strays(store, substep);
-        let are_all_on_paths = self.tree.strays.iter().all(|lanes| *lanes == 0);
-        let are_loaded = !are_all_on_paths && self.find_candidates(store, substep);
+        let are_loaded = self.find_strays(store, substep) && self.find_candidates(store, substep);
         if !are_loaded && self.surfaces.has_candidates() {
             // They may come to other triangles.
             self.load_all(store);
@@ -225,14 +226,20 @@ impl ParticleContacts {
         }
     }
 
-    /// Finds the particles that are not where the candidates expect them at the end of the substep.
-    fn find_strays(&mut self, store: &ParticleStore, substep: Substep) {
-        let Some(begin) = self.paths_begin_at else { return self.tree.mark_all() };
+    /// Finds the particles that are not where the candidates expect them at the end of the substep. Returns true if the
+    /// candidates no longer hold.
+    fn find_strays(&mut self, store: &ParticleStore, substep: Substep) -> bool {
+        let Some(begin) = self.paths_begin_at else {
+            self.tree.mark_all();
+            return true;
+        };
         self.tree.strays.fill(0);
         let count = (substep.index - begin.index + 1) as f32;
         // Less than half of the margin for each particle, so that rounding loses no pair.
-        let limit = 0.24 * self.margin * self.margin;
-        store.mark_strays(&self.paths, Progress { count, limit }, &mut self.tree.strays);
+        let limit_max = 0.24 * self.margin * self.margin;
+        let limit = STRAY_FROM * STRAY_FROM * limit_max;
+        let progress = Progress { count, limit, limit_max };
+        store.mark_strays(&self.paths, progress, &mut self.tree.strays)
     }
 
     /// Finds the candidates of strays for the rest of the step, and orders all. Returns true if it has loaded

@@ -21,34 +21,51 @@ pub(super) const NO_SLOT: u32 = u32::MAX;
 pub(crate) struct Progress {
     /// Number of displacements.
     pub(crate) count: f32,
-    /// Square of the distance.
+    /// Square of the distance from which a particle is a stray.
     pub(crate) limit: f32,
+    /// Square of the distance that no particle may exceed.
+    pub(crate) limit_max: f32,
 }
 
 impl Progress {
-    /// Returns the lanes of the particles that are beside their paths.
+    /// Squares of the distances of eight particles from their paths.
     #[inline(always)]
-    pub(super) fn beside<W: Wide>(
+    pub(super) fn squares<W: Wide>(
         self,
         [x, d]: [[W; 3]; 2],
         [saved_x, saved_d]: [[W; 3]; 2],
-    ) -> W::Mask {
+    ) -> W {
         let count = W::splat(self.count);
         let off = axes(|axis| (x[axis] - saved_x[axis]) + (d[axis] - count * saved_d[axis]));
         let [x, y, z] = axes(|axis| off[axis] * off[axis]);
-        W::splat(self.limit).is_below(x + y + z)
+        x + y + z
     }
-}
 
-/// Sets the bits of the slots of the lanes whose bits are set. `strays` has one for each of sixteen slots.
-#[inline(always)]
-pub(super) fn mark_strays(mut lanes: u32, slots: &[u32; 8], strays: &mut [u16]) {
-    while lanes != 0 {
-        let slot = slots[lanes.trailing_zeros() as usize];
-        if let Some(strays) = strays.get_mut((slot / u16::BITS) as usize) {
-            *strays |= 1 << (slot % u16::BITS);
+    /// Sets the bits of the slots of strays. `strays` has one for each of sixteen slots. Returns true if one of the
+    /// particles is too far from its path.
+    #[inline(always)]
+    pub(super) fn mark_strays<W: Wide>(
+        self,
+        squares: W,
+        slots: &[u32; 8],
+        strays: &mut [u16],
+    ) -> bool {
+        let mut lanes = W::bits(W::splat(self.limit).is_below(squares));
+        if lanes == 0 {
+            return false;
         }
-        lanes &= lanes - 1;
+        let (too_far, mut is_one_too_far) = (W::splat(self.limit_max).is_below(squares), false);
+        let too_far = W::bits(too_far);
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros();
+            let slot = slots[lane as usize];
+            if let Some(strays) = strays.get_mut((slot / u16::BITS) as usize) {
+                *strays |= 1 << (slot % u16::BITS);
+                is_one_too_far |= too_far & (1 << lane) != 0;
+            }
+            lanes &= lanes - 1;
+        }
+        is_one_too_far
     }
 }
 
@@ -62,35 +79,38 @@ pub(super) struct GraphWork<'a> {
 }
 
 impl LaneWork for GraphWork<'_> {
-    type Output = ();
+    type Output = bool;
 
     #[inline(always)]
-    fn run<W: Wide>(self) {
+    fn run<W: Wide>(self) -> bool {
         let Self { now, saved, slots, progress, strays } = self;
         let (now, now_rest) = now.as_chunks();
         let (saved, saved_rest) = saved.as_chunks();
         let (slots, slots_rest) = slots.as_chunks();
+        let mut is_one_too_far = false;
         for ((now, saved), slots) in now.iter().zip(saved).zip(slots) {
-            mark_strays(beside::<W>(now, saved, progress), slots, strays);
+            let squares = squares::<W>(now, saved, progress);
+            is_one_too_far |= progress.mark_strays(squares, slots, strays);
         }
         let mut last = [[PackedParticle::default(); 8]; 2];
         last[0][..now_rest.len()].copy_from_slice(now_rest);
         last[1][..saved_rest.len()].copy_from_slice(saved_rest);
         let mut last_slots = [NO_SLOT; 8];
         last_slots[..slots_rest.len()].copy_from_slice(slots_rest);
-        mark_strays(beside::<W>(&last[0], &last[1], progress), &last_slots, strays);
+        let squares = squares::<W>(&last[0], &last[1], progress);
+        is_one_too_far | progress.mark_strays(squares, &last_slots, strays)
     }
 }
 
-/// Returns a bit for each particle that is beside its path.
+/// Squares of the distances of particles from their paths.
 #[inline(always)]
-fn beside<W: Wide>(
+fn squares<W: Wide>(
     now: &[PackedParticle; 8],
     saved: &[PackedParticle; 8],
     progress: Progress,
-) -> u32 {
+) -> W {
     let [[x, y, z, _], [dx, dy, dz, _]] = W::columns(now);
     let now = [[x, y, z], [dx, dy, dz]];
     let [[x, y, z, _], [dx, dy, dz, _]] = W::columns(saved);
-    W::bits(progress.beside(now, [[x, y, z], [dx, dy, dz]]))
+    progress.squares(now, [[x, y, z], [dx, dy, dz]])
 }

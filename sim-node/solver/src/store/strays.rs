@@ -50,15 +50,23 @@ impl ParticleStore {
     }
 
     /// Marks the particles that are not where their paths lead: `strays` has a bit for each of sixteen slots. NaN is
-    /// beside no path.
-    pub(crate) fn mark_strays(&self, paths: &Paths, progress: Progress, strays: &mut [u16]) {
+    /// beside no path. Returns true if one of them is too far from its path.
+    pub(crate) fn mark_strays(
+        &self,
+        paths: &Paths,
+        progress: Progress,
+        strays: &mut [u16],
+    ) -> bool {
         let kernels = self.kernels();
         let (now, saved) = (self.graph.packed_particles(), paths.graph.as_slice());
         let slots = paths.slots_of_graph.as_slice();
-        kernels.run(GraphWork { now, saved, slots, progress, strays: &mut *strays });
+        let mut is_one_too_far =
+            kernels.run(GraphWork { now, saved, slots, progress, strays: &mut *strays });
         let saved = paths.in_rows.iter().zip(&paths.slots_in_rows);
         for (rows, (saved, slots)) in self.all_rows().zip(saved) {
-            kernels.run(rows.stray_work(saved, slots, progress, &mut *strays));
+            let work = rows.stray_work(saved, slots, progress, &mut *strays);
+            is_one_too_far |= kernels.run(work);
         }
+        is_one_too_far
     }
 }

@@ -2,7 +2,7 @@
 
 use super::Rows;
 use crate::kernels::lanes::{LaneWork, Wide, axes, lane_groups};
-use crate::store::paths::{NO_SLOT, Progress, mark_strays};
+use crate::store::paths::{NO_SLOT, Progress};
 
 /// Saved fields of a row: position and displacement.
 const SAVED_FIELDS: usize = 6;
@@ -41,14 +41,14 @@ impl Rows {
         slots[index / length * stride + index % length] = slot;
     }
 
-    /// Compares the particles with saved paths. Marks those that are beside theirs.
+    /// Compares the particles with saved paths. Marks those that are beside theirs, and returns true if one is too far.
     pub(crate) fn stray_work<'a>(
         &'a self,
         saved: &'a [f32],
         slots: &'a [u32],
         progress: Progress,
         strays: &'a mut [u16],
-    ) -> impl LaneWork<Output = ()> + 'a {
+    ) -> impl LaneWork<Output = bool> + 'a {
         StrayWork { rows: self, saved, slots, progress, strays }
     }
 }
@@ -62,10 +62,11 @@ struct StrayWork<'a> {
 }
 
 impl LaneWork for StrayWork<'_> {
-    type Output = ();
+    type Output = bool;
 
     #[inline(always)]
-    fn run<W: Wide>(self) {
+    fn run<W: Wide>(self) -> bool {
+        let mut is_one_too_far = false;
         let layout = &self.rows.layout;
         let (stride, count) = (layout.stride, layout.columns.div_ceil(8));
         let numbers: &[f32] = self.rows.numbers();
@@ -86,9 +87,10 @@ impl LaneWork for StrayWork<'_> {
                     axes(|axis| W::load(&saved_x[axis][group], 0)),
                     axes(|axis| W::load(&saved_d[axis][group], 0)),
                 ];
-                let lanes = W::bits(self.progress.beside(now, saved));
-                mark_strays(lanes, &slots[group], self.strays);
+                let squares = self.progress.squares(now, saved);
+                is_one_too_far |= self.progress.mark_strays(squares, &slots[group], self.strays);
             }
         }
+        is_one_too_far
     }
 }
