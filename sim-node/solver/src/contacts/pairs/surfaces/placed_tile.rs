@@ -56,6 +56,7 @@ impl PlacedTile {
         for (group, from) in (first..end).step_by(8).enumerate() {
             let triangles = from..end.min(from + 8);
             let slots = &surface.corners[triangles.clone()];
+            let opposites = &surface.opposites[triangles];
             // In a closure, the loads would be compiled for the baseline processor.
             let corners = [
                 positions::<W>(states, slots.iter().map(|slots| slots[0])),
@@ -63,9 +64,9 @@ impl PlacedTile {
                 positions::<W>(states, slots.iter().map(|slots| slots[2])),
             ];
             for (edge, edges) in self.edges.iter_mut().enumerate() {
-                let opposites = triangles.clone().map(|triangle| surface.opposite(triangle, edge));
+                let opposite = positions(states, opposites.iter().map(|slots| slots[edge]));
                 let ends = [corners[edge], corners[next(edge)]];
-                edges.set(group, ends, corners[next(next(edge))], positions(states, opposites));
+                edges.set(group, ends, corners[next(next(edge))], opposite);
             }
         }
     }

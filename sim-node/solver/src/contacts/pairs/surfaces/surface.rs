@@ -17,6 +17,9 @@ pub(super) struct Surface {
     pub(super) corners: Vec<[u32; 3]>,
     /// By triangle and edge: the other triangle at the edge. None at a border, and where more than two meet.
     across: Vec<[Option<Neighbor>; 3]>,
+    /// By triangle and edge: slot of the corner of the other triangle, if it is whole, that is not on the edge. Else the
+    /// slot at which the edge starts.
+    pub(super) opposites: Vec<[u32; 3]>,
     /// By slot: first entry in `fans`, and the end of the last one.
     fan_starts: Vec<u32>,
     /// The triangles around each slot, ascending.
@@ -75,6 +78,7 @@ impl Surface {
             ..Self::default()
         };
         surface.set_fans(particles.len());
+        surface.set_opposites();
         surface
     }
 
@@ -99,12 +103,24 @@ impl Surface {
         self.fan_starts = starts;
     }
 
+    fn set_opposites(&mut self) {
+        let mut opposites = std::mem::take(&mut self.opposites);
+        opposites.clear();
+        opposites.extend((0_u32..).zip(&self.corners).map(|(triangle, corners)| {
+            [0, 1, 2].map(|edge| {
+                self.neighbor(triangle, edge).map_or(corners[edge], |other| other.opposite)
+            })
+        }));
+        self.opposites = opposites;
+    }
+
     /// Takes the triangles with torn sides out.
     pub(super) fn follow_tears(&mut self, is_torn: &[bool]) {
         for (is_triangle_torn, sides) in self.is_torn.iter_mut().zip(&self.sides) {
             *is_triangle_torn =
                 sides.iter().flatten().any(|constraint| is_torn[*constraint as usize]);
         }
+        self.set_opposites();
     }
 
     pub(super) fn is_whole(&self, triangle: u32) -> bool {
@@ -131,15 +147,6 @@ impl Surface {
     #[inline(always)]
     pub(super) fn neighbor(&self, triangle: u32, edge: usize) -> Option<Neighbor> {
         self.across[triangle as usize][edge].filter(|other| self.is_whole(other.triangle))
-    }
-
-    /// Slot of the corner of the other triangle at an edge, which is not on the edge. Where there is none, the slot at
-    /// which the edge starts.
-    #[inline(always)]
-    pub(super) fn opposite(&self, triangle: usize, edge: usize) -> u32 {
-        #[allow(clippy::cast_possible_truncation, reason = "at most 2^24 triangles")]
-        let neighbor = self.neighbor(triangle as u32, edge);
-        neighbor.map_or(self.corners[triangle][edge], |neighbor| neighbor.opposite)
     }
 
     /// Returns a triangle around the nearest point of this one that leads nearer to the viewer, or `None` if the
