@@ -7,6 +7,7 @@
 mod candidate;
 mod contact;
 mod faces;
+mod nearby;
 mod nearest;
 mod placed_tile;
 mod surface;
@@ -25,6 +26,7 @@ use crate::scene::model::Model;
 use crate::state::tear::Torn;
 use candidate::{Candidate, add_candidate, has_candidate};
 use contact::SurfaceContact;
+use nearby::NearbyWork;
 use nearest::{Feature, Nearest};
 use surface::{Found, Surface, View};
 use touching::{TouchWork, Touching};
@@ -34,6 +36,9 @@ use triangle_tiles::{TriangleTiles, Wanted};
 /// Largest number of triangles that a particle never touches, on average. Further ones touch it as all others.
 const NEVER_PER_PARTICLE: usize = 128;
 
+/// Number of particles and triangles in reach that are examined together.
+const IN_REACH_MAX: usize = 1024;
+
 /// Finds and resolves the contacts of particles with triangles. Empty in other modes.
 #[derive(Debug, Clone, Default)]
 pub(super) struct SurfaceContacts {
@@ -41,6 +46,9 @@ pub(super) struct SurfaceContacts {
     tiles: TriangleTiles,
     /// Slots and triangles that are near each other at load.
     load_pairs: LoadPairs,
+    /// Particles and triangles that may be near, and the parts of the triangles that are.
+    in_reach: Vec<[u32; 2]>,
+    features: Vec<Option<Feature>>,
     candidate_count_max: usize,
     candidates: Vec<Candidate>,
     /// By slot: the candidate that was found last.
@@ -79,6 +87,8 @@ impl SurfaceContacts {
             surface,
             tiles,
             load_pairs,
+            in_reach: Vec::with_capacity(IN_REACH_MAX),
+            features: Vec::with_capacity(IN_REACH_MAX),
             candidate_count_max,
             newest: vec![None; particles.len()],
             candidates: Vec::with_capacity(candidate_count_max),
@@ -115,34 +125,28 @@ impl SurfaceContacts {
     pub(super) fn find(&mut self, search: &SurfaceSearch<'_>) -> Search {
         self.tiles.refit(&self.surface, search);
         self.keep_candidates(search);
-        let Self { surface, tiles, load_pairs, candidates, newest, .. } = self;
-        let (particles, count_max) = (search.particles, self.candidate_count_max);
-        let mut accept = |[slot, triangle]: [u32; 2]| {
-            let Some(feature) = near_feature(surface, search, [slot, triangle]) else {
-                return Search::Continue(());
-            };
-            // Triangles that share the nearest point are one candidate.
-            let is_known = has_candidate(candidates, newest[slot as usize], |known| {
-                surface.shares(triangle, feature, known)
-            });
-            if is_known {
-                return Search::Continue(());
-            }
-            let triangle = surface.first_sharing(triangle, feature, |one| {
-                !surface.has_corner(one, slot) && !load_pairs.never_touch(slot, one)
-            });
-            if candidates.len() == count_max {
-                return Search::Break(());
-            }
-            let first = surface.corners[triangle as usize][0];
-            let key = order_key(particles[slot as usize], particles[first as usize]);
-            let candidate = Candidate { slot, triangle, previous: None, key, never_touches: false };
-            add_candidate(candidates, newest, candidate);
-            Search::Continue(())
+        let Self { surface, tiles, load_pairs, in_reach, features, candidates, newest, .. } = self;
+        let (surface, load_pairs) = (&*surface, &*load_pairs);
+        let mut adding = Adding {
+            surface,
+            load_pairs,
+            search,
+            features,
+            candidates,
+            newest,
+            count_max: self.candidate_count_max,
         };
         let except = |tiles| load_pairs.untouchable(tiles);
         let wanted = Wanted::Nearest;
-        let found = tiles.search((surface, wanted), search, &except, &mut accept);
+        let mut found = tiles.search((surface, wanted), search, &except, &mut |pair| {
+            in_reach.push(pair);
+            let has_room = in_reach.len() < IN_REACH_MAX;
+            if has_room { Search::Continue(()) } else { adding.add(in_reach) }
+        });
+        if found.is_continue() {
+            found = adding.add(in_reach);
+        }
+        in_reach.clear();
         order_by_key(&self.candidates, &mut self.ordered, |candidate| candidate.key);
         found
     }
@@ -190,31 +194,45 @@ impl SurfaceContacts {
     }
 }
 
-/// Returns the part of a triangle with the nearest point, if that is a local minimum of the distance and comes near
-/// the particle.
-#[inline(always)]
-fn near_feature(
-    surface: &Surface,
-    search: &SurfaceSearch<'_>,
-    [slot, triangle]: [u32; 2],
-) -> Option<Feature> {
-    let SurfaceSearch { states, span, distance, .. } = *search;
-    let view = View { particles: states, slot, time: 0.0 };
-    let corners = surface.place(triangle, view);
-    let nearest = Nearest::new(corners);
-    let is_separate = surface.is_whole(triangle) && !surface.has_corner(triangle, slot);
-    if !is_separate || surface.nearer(triangle, &nearest, view).is_some() {
-        return None;
+/// Adds the candidates among particles and triangles in reach.
+struct Adding<'a> {
+    surface: &'a Surface,
+    load_pairs: &'a LoadPairs,
+    search: &'a SurfaceSearch<'a>,
+    features: &'a mut Vec<Option<Feature>>,
+    candidates: &'a mut Vec<Candidate>,
+    newest: &'a mut [Option<u32>],
+    count_max: usize,
+}
+
+impl Adding<'_> {
+    /// Adds those of the pairs that come near each other, and empties the list. Breaks if there are too many candidates.
+    fn add(&mut self, pairs: &mut Vec<[u32; 2]>) -> Search {
+        let Self { surface, load_pairs, search, features, candidates, newest, count_max } = self;
+        search.kernels.run(NearbyWork { surface, search, pairs: &*pairs, features: &mut **features });
+        for ([slot, triangle], feature) in pairs.drain(..).zip(features.iter()) {
+            let Some(feature) = *feature else { continue };
+            // Triangles that share the nearest point are one candidate.
+            let is_known = has_candidate(candidates, newest[slot as usize], |known| {
+                surface.shares(triangle, feature, known)
+            });
+            if is_known {
+                continue;
+            }
+            if candidates.len() == *count_max {
+                return Search::Break(());
+            }
+            let triangle = surface.first_sharing(triangle, feature, |one| {
+                !surface.has_corner(one, slot) && !load_pairs.never_touch(slot, one)
+            });
+            let first = surface.corners[triangle as usize][0];
+            let [a, b] = [slot, first].map(|slot| search.particles[slot as usize]);
+            let key = order_key(a, b);
+            let candidate = Candidate { slot, triangle, previous: None, key, never_touches: false };
+            add_candidate(candidates, newest, candidate);
+        }
+        Search::Continue(())
     }
-    let later = surface.place(triangle, View { time: span, ..view });
-    let apart = -nearest.mean(corners);
-    let length = apart.dot(apart).sqrt();
-    // The distance along the direction in which they are apart now.
-    let at_end = apart.dot(-nearest.mean(later)) / length;
-    let least = if at_end < length { at_end } else { length };
-    let is_free = states[slot as usize].0[3] > 0.0
-        || surface.corners[triangle as usize].iter().any(|one| states[*one as usize].0[3] > 0.0);
-    (is_free && least < distance).then_some(nearest.feature)
 }
 
 fn at_load(model: &Model, particle: u32) -> PackedParticle {

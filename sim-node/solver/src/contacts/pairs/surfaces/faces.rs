@@ -22,11 +22,60 @@ pub(super) struct Faces {
 }
 
 /// The corners of eight triangles relative to a particle each.
-struct Corners<W> {
+pub(super) struct Corners<W> {
     /// Where the paths start.
-    starts: [[W; 3]; 3],
+    pub(super) starts: [[W; 3]; 3],
     /// Where they end.
-    ends: [[W; 3]; 3],
+    pub(super) ends: [[W; 3]; 3],
+}
+
+impl<W: Wide> Corners<W> {
+    /// Gathers the corners. `slots` has those of the particles, and `triangles` their triangles. The paths end after
+    /// `time` displacements.
+    #[inline(always)]
+    pub(super) fn new(
+        surface: &Surface,
+        states: &[PackedParticle],
+        (slots, triangles): ([u32; 8], [u32; 8]),
+        time: f32,
+    ) -> Self {
+        let [a, b, c] = corner_slots(surface, triangles);
+        let [origins, displacements] = split(W::columns(&gather(states, slots.into_iter())));
+        let mut corners = Self { starts: [[W::splat(0.0); 3]; 3], ends: [[W::splat(0.0); 3]; 3] };
+        for (corner, slots) in [a, b, c].into_iter().enumerate() {
+            let [at, moved] = split(W::columns(&gather(states, slots.into_iter())));
+            let way = scaled(difference(moved, displacements), W::splat(time));
+            corners.starts[corner] = difference(at, origins);
+            corners.ends[corner] = sum(corners.starts[corner], way);
+        }
+        corners
+    }
+}
+
+/// Returns a bit for each particle whose nearest point is on the face of its triangle, and the shares of the corners in
+/// that point (Ericson 2005, Real-Time Collision Detection, section 5.1.5).
+#[inline(always)]
+pub(super) fn nearest_on_faces<W: Wide>([a, b, c]: [[W; 3]; 3]) -> (u32, [W; 3]) {
+    let (zero, one) = (W::splat(0.0), W::splat(1.0));
+    let (ab, ac) = (difference(b, a), difference(c, a));
+    let (ab_a, ac_a) = (-dot(ab, a), -dot(ac, a));
+    let (ab_b, ac_b) = (-dot(ab, b), -dot(ac, b));
+    let (ab_c, ac_c) = (-dot(ab, c), -dot(ac, c));
+    let mut beside = W::bits(W::both(ab_a.is_at_most(zero), ac_a.is_at_most(zero)));
+    beside |= W::bits(W::both(zero.is_at_most(ab_b), ac_b.is_at_most(ab_b)));
+    beside |= W::bits(W::both(zero.is_at_most(ac_c), ab_c.is_at_most(ac_c)));
+    let beside_ab = ab_a * ac_b - ab_b * ac_a;
+    let along_ab = W::both(zero.is_at_most(ab_a), ab_b.is_at_most(zero));
+    beside |= W::bits(W::both(beside_ab.is_at_most(zero), along_ab));
+    let beside_ca = ab_c * ac_a - ab_a * ac_c;
+    let along_ca = W::both(zero.is_at_most(ac_a), ac_c.is_at_most(zero));
+    beside |= W::bits(W::both(beside_ca.is_at_most(zero), along_ca));
+    let beside_bc = ab_b * ac_c - ab_c * ac_b;
+    let along_bc = W::both(zero.is_at_most(ac_b - ab_b), zero.is_at_most(ab_c - ac_c));
+    beside |= W::bits(W::both(beside_bc.is_at_most(zero), along_bc));
+    let scale = one / (beside_ab + beside_bc + beside_ca);
+    let (v, w) = (beside_ca * scale, beside_ab * scale);
+    (!beside & 0xff, [one - v - w, v, w])
 }
 
 impl Faces {
@@ -38,53 +87,16 @@ impl Faces {
         states: &[PackedParticle],
         (slots, triangles): ([u32; 8], [u32; 8]),
     ) {
-        let [a, b, c] = corner_slots(surface, triangles);
-        let [origins, displacements] = split(W::columns(&gather(states, slots.into_iter())));
-        let mut corners =
-            Corners { starts: [[W::splat(0.0); 3]; 3], ends: [[W::splat(0.0); 3]; 3] };
-        for (corner, slots) in [a, b, c].into_iter().enumerate() {
-            let [at, moved] = split(W::columns(&gather(states, slots.into_iter())));
-            corners.starts[corner] = difference(at, origins);
-            corners.ends[corner] = sum(corners.starts[corner], difference(moved, displacements));
-        }
-        self.find_between(&corners);
-    }
-
-    /// Finds the points between the corners (Ericson 2005, Real-Time Collision Detection, section 5.1.5).
-    #[inline(always)]
-    fn find_between<W: Wide>(&mut self, corners: &Corners<W>) {
-        let (zero, one) = (W::splat(0.0), W::splat(1.0));
-        let [a, b, c] = corners.ends;
-        let (ab, ac) = (difference(b, a), difference(c, a));
-        let (ab_a, ac_a) = (-dot(ab, a), -dot(ac, a));
-        let (ab_b, ac_b) = (-dot(ab, b), -dot(ac, b));
-        let (ab_c, ac_c) = (-dot(ab, c), -dot(ac, c));
-        let mut beside = W::bits(W::both(ab_a.is_at_most(zero), ac_a.is_at_most(zero)));
-        beside |= W::bits(W::both(zero.is_at_most(ab_b), ac_b.is_at_most(ab_b)));
-        beside |= W::bits(W::both(zero.is_at_most(ac_c), ab_c.is_at_most(ac_c)));
-        let beside_ab = ab_a * ac_b - ab_b * ac_a;
-        let along_ab = W::both(zero.is_at_most(ab_a), ab_b.is_at_most(zero));
-        beside |= W::bits(W::both(beside_ab.is_at_most(zero), along_ab));
-        let beside_ca = ab_c * ac_a - ab_a * ac_c;
-        let along_ca = W::both(zero.is_at_most(ac_a), ac_c.is_at_most(zero));
-        beside |= W::bits(W::both(beside_ca.is_at_most(zero), along_ca));
-        let beside_bc = ab_b * ac_c - ab_c * ac_b;
-        let along_bc = W::both(zero.is_at_most(ac_b - ab_b), zero.is_at_most(ab_c - ac_c));
-        beside |= W::bits(W::both(beside_bc.is_at_most(zero), along_bc));
-        self.lanes = !beside & 0xff;
-
-        let scale = one / (beside_ab + beside_bc + beside_ca);
-        let (v, w) = (beside_ca * scale, beside_ab * scale);
-        let weights = [one - v - w, v, w];
-        let across = cross(ab, ac);
-        let [start_a, start_b, start_c] = corners.starts;
-        let across_start = cross(difference(start_b, start_a), difference(start_c, start_a));
-        let is_below = dot(across_start, negated(mean(weights, corners.starts))).is_below(zero);
+        let Corners { starts, ends } = Corners::<W>::new(surface, states, (slots, triangles), 1.0);
+        let (lanes, weights) = nearest_on_faces(ends);
+        self.lanes = lanes;
+        let across = normals(ends);
+        let is_below = dot(normals(starts), negated(mean(weights, starts))).is_below(W::splat(0.0));
         let direction = select(is_below, negated(across), across);
         let normal = divided(direction, dot(direction, direction).sqrt());
         store(weights, &mut self.weights);
         store(normal, &mut self.normals);
-        dot(normal, negated(mean(weights, corners.ends))).store(&mut self.heights, 0);
+        dot(normal, negated(mean(weights, ends))).store(&mut self.heights, 0);
     }
 
     /// Shares of the corners, and the direction away from the triangle.
@@ -110,9 +122,15 @@ fn split<W: Wide>([[x, y, z, _], [dx, dy, dz, _]]: [[W; 4]; 2]) -> [[W; 3]; 2] {
     [[x, y, z], [dx, dy, dz]]
 }
 
+/// Normals of triangles, of any length.
+#[inline(always)]
+fn normals<W: Wide>([a, b, c]: [[W; 3]; 3]) -> [W; 3] {
+    cross(difference(b, a), difference(c, a))
+}
+
 /// The weighted sum of three vectors.
 #[inline(always)]
-fn mean<W: Wide>([u, v, w]: [W; 3], [a, b, c]: [[W; 3]; 3]) -> [W; 3] {
+pub(super) fn mean<W: Wide>([u, v, w]: [W; 3], [a, b, c]: [[W; 3]; 3]) -> [W; 3] {
     sum(sum(scaled(a, u), scaled(b, v)), scaled(c, w))
 }
 

@@ -1,0 +1,93 @@
+//! Tells which triangles in reach have a point that is nearest to a particle and comes near it.
+
+use super::faces::{Corners, mean, nearest_on_faces};
+use super::nearest::{Feature, Nearest};
+use super::surface::{Surface, View};
+use super::triangle_tiles::SurfaceSearch;
+use crate::kernels::lanes::{LaneWork, PackedParticle, Wide};
+use crate::kernels::vectors::dot;
+
+/// Finds, for each particle and triangle in `pairs`, the part of the triangle with the nearest point, if that is a local
+/// minimum of the distance and comes near the particle.
+pub(super) struct NearbyWork<'a> {
+    pub(super) surface: &'a Surface,
+    pub(super) search: &'a SurfaceSearch<'a>,
+    pub(super) pairs: &'a [[u32; 2]],
+    pub(super) features: &'a mut Vec<Option<Feature>>,
+}
+
+impl LaneWork for NearbyWork<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<W: Wide>(self) {
+        let Self { surface, search, pairs, features } = self;
+        features.clear();
+        let (groups, rest) = pairs.as_chunks::<8>();
+        for pairs in groups {
+            let (on_face, near) = near_faces::<W>(surface, search, pairs);
+            for (lane, pair) in pairs.iter().enumerate() {
+                features.push(if on_face & (1 << lane) == 0 {
+                    nearby(surface, search, *pair)
+                } else {
+                    let is_near = near & (1 << lane) != 0;
+                    (is_near && can_touch(surface, search.states, *pair)).then_some(Feature::Face)
+                });
+            }
+        }
+        features.extend(rest.iter().map(|pair| nearby(surface, search, *pair)));
+    }
+}
+
+/// Returns a bit for each particle whose nearest point is on the face of its triangle, and one for each that comes near
+/// this point.
+#[inline(always)]
+fn near_faces<W: Wide>(
+    surface: &Surface,
+    search: &SurfaceSearch<'_>,
+    pairs: &[[u32; 2]; 8],
+) -> (u32, u32) {
+    let (mut slots, mut triangles) = ([0; 8], [0; 8]);
+    for (lane, [slot, triangle]) in pairs.iter().enumerate() {
+        (slots[lane], triangles[lane]) = (*slot, *triangle);
+    }
+    let Corners { starts, ends } =
+        Corners::<W>::new(surface, search.states, (slots, triangles), search.span);
+    let (on_face, weights) = nearest_on_faces(starts);
+    let (point, later) = (mean(weights, starts), mean(weights, ends));
+    let length = dot(point, point).sqrt();
+    // The distance along the direction in which they are apart now.
+    let at_end = dot(point, later) / length;
+    let distance = W::splat(search.distance);
+    (on_face, W::bits(length.is_below(distance)) | W::bits(at_end.is_below(distance)))
+}
+
+/// Finds the part of one triangle. It has no lanes, so it is not compiled into the loop over them.
+#[inline(never)]
+fn nearby(surface: &Surface, search: &SurfaceSearch<'_>, pair: [u32; 2]) -> Option<Feature> {
+    let SurfaceSearch { states, span, distance, .. } = *search;
+    let [slot, triangle] = pair;
+    let view = View { particles: states, slot, time: 0.0 };
+    let corners = surface.place(triangle, view);
+    let nearest = Nearest::new(corners);
+    if !can_touch(surface, states, pair) || surface.nearer(triangle, &nearest, view).is_some() {
+        return None;
+    }
+    let later = surface.place(triangle, View { time: span, ..view });
+    let (point, later) = (nearest.mean(corners), nearest.mean(later));
+    let length = point.dot(point).sqrt();
+    let is_near = length < distance || point.dot(later) / length < distance;
+    is_near.then_some(nearest.feature)
+}
+
+/// True if a particle is no corner of a triangle, which is whole, and one of them is free.
+fn can_touch(
+    surface: &Surface,
+    states: &[PackedParticle],
+    [slot, triangle]: [u32; 2],
+) -> bool {
+    let is_free = |slot: u32| states[slot as usize].0[3] > 0.0;
+    surface.is_whole(triangle)
+        && !surface.has_corner(triangle, slot)
+        && (is_free(slot) || surface.corners[triangle as usize].iter().any(|one| is_free(*one)))
+}
