@@ -155,3 +155,18 @@ pub(super) fn take_lowest(bits: &mut u32) -> Option<u32> {
     *bits &= bits.wrapping_sub(1);
     lowest
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn members_are_those_whose_bits_are_set() {
+        let mut lanes = [0; 3];
+        mark_all(&mut lanes, 35);
+        assert_eq!(lanes, [0xffff, 0xffff, 0b111]);
+        assert!(members(&lanes).eq(0..35));
+        lanes = [0b100, 0, 1 << 15];
+        assert!(members(&lanes).eq([2, 47]));
+    }
+}
