@@ -235,6 +235,7 @@ impl Contacts {
         (obstacle, mesh): (&Obstacle, &PlacedMesh),
         mut reaction: Option<&mut Reaction>,
     ) {
+        let mut lists = std::mem::take(&mut self.near_meshes);
         for index in 8 * group..8 * group + 8 {
             let path = particles.path(index);
             let (start, displacement) = (path.start.to_array(), path.displacement.to_array());
@@ -246,17 +247,17 @@ impl Contacts {
             let before = self.bounce(index);
             let mut room = mesh.room(&path);
             let number = particles.first() + index;
-            let mut triangles = mesh.list(&mut self.near_meshes, number, &room);
-            if room.is_free(&triangles) {
+            let mut triangles = mesh.list(&mut lists, number, &room);
+            if room.is_free(triangles) {
                 continue;
             }
             for push_count in 0..=PUSHES_MAX {
                 let path = particles.path(index);
                 if !mesh.is_within(&room, &path) {
                     room = mesh.room(&path);
-                    triangles = mesh.list(&mut self.near_meshes, number, &room);
+                    triangles = mesh.list(&mut lists, number, &room);
                 }
-                let stop = mesh.stop(&path, &room, &triangles, push_count);
+                let stop = mesh.stop(&path, &room, triangles, push_count);
                 if stop.is_some() && push_count == 0 {
                     count(reaction.as_deref_mut());
                 }
@@ -278,6 +279,7 @@ impl Contacts {
                 }
             }
         }
+        self.near_meshes = lists;
     }
 
     /// Moves a particle with the mesh that leaves it no room.

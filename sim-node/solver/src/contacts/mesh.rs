@@ -35,7 +35,7 @@ const SKIN: f32 = 8.0;
 /// are pushed less.
 const PUSH_SHARE: f32 = 0.25;
 /// Number of further substeps for which triangles near a particle are listed.
-const SUBSTEPS_AHEAD: f32 = 2.0;
+const SUBSTEPS_AHEAD: f32 = 4.0;
 /// Largest number of pushes of a particle in a substep. A particle in a wedge comes nearer to both sides
 /// with each.
 pub(crate) const PUSHES_MAX: usize = 8;
@@ -98,12 +98,12 @@ impl PlacedMesh {
     }
 
     /// Lists the triangles that a particle can touch, which its number names.
-    pub(crate) fn list(
+    pub(crate) fn list<'a>(
         &self,
-        lists: &mut NearMeshes,
+        lists: &'a mut NearMeshes,
         particle: usize,
         room: &Room,
-    ) -> NearTriangles {
+    ) -> &'a NearTriangles {
         let query = NearQuery {
             collider: self.mesh.collider,
             particle,

@@ -13,7 +13,7 @@ const LISTED_MAX: usize = 32;
 const LISTS_MAX: usize = 1 << 17;
 
 /// The triangles in a box, or more.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(crate) struct NearTriangles {
     indices: [u32; LISTED_MAX],
     /// None if there are too many of them.
@@ -69,7 +69,7 @@ impl NearMeshes {
     }
 
     /// Returns the triangles that the particle of a query can touch.
-    pub(super) fn find(&mut self, tree: &TriangleTree, query: &NearQuery) -> NearTriangles {
+    pub(super) fn find(&mut self, tree: &TriangleTree, query: &NearQuery) -> &NearTriangles {
         let NearQuery { collider, particle, bounds, margin } = *query;
         // Meshes that a particle is near have different places.
         let place = (particle + collider * 0x9e37_79b1) & (self.lists.len() - 1);
@@ -85,7 +85,7 @@ impl NearMeshes {
                 triangles.count = None;
             }
         }
-        list.triangles
+        &list.triangles
     }
 }
 
