@@ -181,7 +181,7 @@ impl Meeting<'_> {
         let (first, _) = self.path();
         let mut room = mesh.room(&first);
         let mut triangles = mesh.list(lists, number, &room);
-        if room.is_free(&triangles) {
+        if room.is_free(triangles) {
             return;
         }
         let mut surface = *surface;
@@ -192,7 +192,7 @@ impl Meeting<'_> {
                 room = mesh.room(&made);
                 triangles = mesh.list(lists, number, &room);
             }
-            let stop = mesh.stop(&made, &room, &triangles, push_count);
+            let stop = mesh.stop(&made, &room, triangles, push_count);
             if stop.is_some() && push_count == 0 {
                 self.reaction.contacts += 1;
             }

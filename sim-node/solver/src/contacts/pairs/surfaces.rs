@@ -209,7 +209,7 @@ impl Adding<'_> {
     /// Adds those of the pairs that come near each other, and empties the list. Breaks if there are too many candidates.
     fn add(&mut self, pairs: &mut Vec<[u32; 2]>) -> Search {
         let Self { surface, load_pairs, search, features, candidates, newest, count_max } = self;
-        search.kernels.run(NearbyWork { surface, search, pairs: &*pairs, features: &mut **features });
+        search.kernels.run(NearbyWork { surface, search, pairs, features });
         for ([slot, triangle], feature) in pairs.drain(..).zip(features.iter()) {
             let Some(feature) = *feature else { continue };
             // Triangles that share the nearest point are one candidate.

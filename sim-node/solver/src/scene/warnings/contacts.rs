@@ -106,8 +106,8 @@ impl MeshAtLoad {
         let room = self.placed.room(&path);
         let triangles = self.placed.list(&mut self.near, 0, &room);
         // After the last push, only passages count.
-        self.placed.stop(&path, &room, &triangles, PUSHES_MAX)?;
-        match self.placed.stop(&path, &room, &triangles, 0)? {
+        self.placed.stop(&path, &room, triangles, PUSHES_MAX)?;
+        match self.placed.stop(&path, &room, triangles, 0)? {
             Stop::Push(hit) => Some(hit.normal),
             Stop::Hold => None,
         }

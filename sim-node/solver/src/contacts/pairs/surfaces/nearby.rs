@@ -81,11 +81,7 @@ fn nearby(surface: &Surface, search: &SurfaceSearch<'_>, pair: [u32; 2]) -> Opti
 }
 
 /// True if a particle is no corner of a triangle, which is whole, and one of them is free.
-fn can_touch(
-    surface: &Surface,
-    states: &[PackedParticle],
-    [slot, triangle]: [u32; 2],
-) -> bool {
+fn can_touch(surface: &Surface, states: &[PackedParticle], [slot, triangle]: [u32; 2]) -> bool {
     let is_free = |slot: u32| states[slot as usize].0[3] > 0.0;
     surface.is_whole(triangle)
         && !surface.has_corner(triangle, slot)

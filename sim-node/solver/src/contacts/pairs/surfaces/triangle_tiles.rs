@@ -87,8 +87,17 @@ impl TriangleTiles {
         placed.iter_mut().for_each(PlacedTile::clear);
         let mut examine = |pairs: &mut Vec<[u32; 2]>| {
             let (tiles, placed, accept) = (&mut *tiles, &mut *placed, &mut *accept);
-            let work =
-                SearchWork { tiles, strays, placed, pairs, search, surface, wanted, except, accept };
+            let work = SearchWork {
+                tiles,
+                strays,
+                placed,
+                pairs,
+                search,
+                surface,
+                wanted,
+                except,
+                accept,
+            };
             let found = search.kernels.run(work);
             pairs.clear();
             found
