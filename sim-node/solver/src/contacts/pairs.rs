@@ -38,11 +38,10 @@ use crate::store::{Location, ParticleStore, Paths, Progress};
 /// another contact may push them together.
 const REACH: f32 = 1.1;
 /// Distance by which two particles may come nearer than on their paths, in contact distances: each may leave its own by
-/// half of it. A larger one finds more candidates, a smaller one finds them more often. No bit depends on it unless there
-/// are too many candidates.
-const PARTICLES_MARGIN: f32 = 0.25;
-/// The same where cloths touch as surfaces. There, bits depend on when candidates are found, and so on this margin.
-const SURFACES_MARGIN: f32 = 0.3;
+/// half of it. A larger one finds more candidates, a smaller one finds them more often. No bit depends on it where
+/// particles touch, unless there are too many candidates. Where cloths touch as surfaces, bits depend on when
+/// candidates are found, and so on this margin.
+const MARGIN: f32 = 0.3;
 /// Part of the distance from its path that a particle may have. Those beyond it get new paths with the ones that are too
 /// far away: they would soon be, too.
 const STRAY_FROM: f32 = 0.5;
@@ -108,7 +107,6 @@ impl ParticleContacts {
         let count = particles.len();
         let candidate_count_max = CANDIDATES_PER_PARTICLE * count;
         let has_surfaces = mode == ContactMode::Surfaces;
-        let margin = if has_surfaces { SURFACES_MARGIN } else { PARTICLES_MARGIN };
         let surfaces = has_surfaces.then(|| {
             SurfaceContacts::new(model, &particles, (thickness, kernels), candidate_count_max)
         });
@@ -122,7 +120,7 @@ impl ParticleContacts {
         let states = vec![PackedParticle([f32::NAN; 8]); count.next_multiple_of(TILE)];
         Self {
             thickness,
-            margin: margin * thickness,
+            margin: MARGIN * thickness,
             locations: vec![Location::default(); count],
             expected: if has_surfaces { states.clone() } else { Vec::new() },
             states,
