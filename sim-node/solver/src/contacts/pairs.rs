@@ -42,8 +42,8 @@ const REACH: f32 = 1.1;
 /// particles touch, unless there are too many candidates. Where cloths touch as surfaces, bits depend on when
 /// candidates are found, and so on this margin.
 const MARGIN: f32 = 0.3;
-/// Part of the distance from its path that a particle may have. Those beyond it get new paths with the ones that are too
-/// far away: they would soon be, too.
+/// Fraction of the allowed distance from its path beyond which a particle is a stray. A search begins when one exceeds the
+/// whole distance, and gives all strays new paths, because they would soon exceed it, too.
 const STRAY_FROM: f32 = 0.5;
 /// Part of the tiles with strays from which on all paths begin anew: a full search is then as fast.
 const STRAY_PART_MAX: f32 = 0.5;
@@ -264,7 +264,17 @@ impl ParticleContacts {
         let mut is_complete = self.search(Query { times, distance }, kernels).is_continue();
         if self.surfaces.are_on() {
             let Self { tree, expected: states, particles, .. } = self;
-            let search = SurfaceSearch { tree, states, particles, passed, span, distance, kernels };
+            let begins_paths = begin.is_none();
+            let search = SurfaceSearch {
+                tree,
+                states,
+                particles,
+                begins_paths,
+                passed,
+                span,
+                distance,
+                kernels,
+            };
             is_complete &= self.surfaces.find(&search).is_continue();
         }
         self.is_complete = is_complete;
@@ -425,7 +435,7 @@ mod tests {
     }
 
     /// Three tiles of particles at rest, 10 m apart. In the first two of them, two particles meet head on late in the
-    /// step. In the first, another one is stopped by the floor before, so its tile is searched again.
+    /// step. In the first, another one is stopped by the floor before, so it gets a new path, and the tile new boxes.
     #[test]
     fn particles_meet_late_in_a_step_whether_others_have_left_their_paths_before_or_not() {
         let particle = |x: u32, place: u32| match (x, place) {

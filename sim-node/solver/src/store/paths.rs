@@ -41,8 +41,8 @@ impl Progress {
         x + y + z
     }
 
-    /// Sets the bits of the slots of strays. `strays` has one for each of sixteen slots. Returns true if one of the
-    /// particles is too far from its path.
+    /// Sets the bits of the slots of strays: entry i of `strays` has those of the slots 16 i to 16 i + 15. Returns true if
+    /// one of the particles is too far from its path.
     #[inline(always)]
     pub(super) fn mark_strays<W: Wide>(
         self,

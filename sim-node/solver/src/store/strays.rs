@@ -49,8 +49,8 @@ impl ParticleStore {
         }
     }
 
-    /// Marks the particles that are not where their paths lead: `strays` has a bit for each of sixteen slots. NaN is
-    /// beside no path. Returns true if one of them is too far from its path.
+    /// Marks the particles that are not where their paths lead: entry i of `strays` has the bits of the slots 16 i to
+    /// 16 i + 15. NaN is beside no path. Returns true if one of them is too far from its path.
     pub(crate) fn mark_strays(
         &self,
         paths: &Paths,

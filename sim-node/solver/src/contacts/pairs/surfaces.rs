@@ -77,6 +77,7 @@ impl SurfaceContacts {
             tree: &tree,
             states: &states,
             particles,
+            begins_paths: true,
             passed: 0.0,
             span: 0.0,
             distance: load::CONNECTED_REACH * thickness,
@@ -151,12 +152,13 @@ impl SurfaceContacts {
         found
     }
 
-    /// Keeps the candidates without strays. The search finds the others.
+    /// Keeps the candidates whose particle is on its path. The search finds the others.
     ///
     /// The triangle is the one on the paths, as in the search: where the particle is now, it may be another one, which the
-    /// search leaves out, or finds again.
+    /// search would not recognize. It is kept even if it has a stray: its point may be a corner that the search finds only
+    /// at another triangle, one without strays.
     fn keep_candidates(&mut self, search: &SurfaceSearch<'_>) {
-        let Self { surface, tiles, load_pairs, candidates, newest, ordered, .. } = self;
+        let Self { surface, load_pairs, candidates, newest, ordered, .. } = self;
         candidates.clear();
         newest.fill(None);
         for candidate in ordered.iter() {
@@ -169,7 +171,7 @@ impl SurfaceContacts {
             let is_known = has_candidate(candidates, newest[slot as usize], |known| {
                 surface.shares(triangle, nearest.feature, known)
             });
-            if !is_known && !tiles.has_stray(triangle) {
+            if !is_known {
                 let never_touches = load_pairs.never_touch(slot, triangle);
                 let kept = Candidate { triangle, never_touches, ..*candidate };
                 add_candidate(candidates, newest, kept);
@@ -267,4 +269,115 @@ fn near_at_load(
         if is_full { Search::Break(()) } else { Search::Continue(()) }
     });
     LoadPairs::from_pairs(never, closer, particles.len())
+}
+
+#[cfg(test)]
+mod tests {
+    //! Searches for strays against searches for all.
+    use super::super::REACH;
+    use super::*;
+    use crate::scene::Scene;
+
+    const SIDE: u32 = 24;
+    const SPACING: f32 = 0.02;
+    /// Substeps of the paths, and those that have passed when some particles leave theirs.
+    const SPAN: f32 = 8.0;
+    const PASSED: f32 = 3.0;
+
+    /// Numbers from -1 to 1.
+    struct Random(u32);
+
+    impl Random {
+        fn next(&mut self) -> f32 {
+            self.0 = self.0.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (self.0 >> 8) as f32 / (1_u32 << 23) as f32 - 1.0
+        }
+    }
+
+    /// A particle at rest in a rolled sheet whose layers are 25 mm apart, in disorder.
+    fn rolled(particle: u32, random: &mut Random) -> PackedParticle {
+        let (column, row) = (particle % SIDE, particle / SIDE);
+        let pitch = 0.025 / std::f32::consts::TAU;
+        // The length of the spiral up to an angle is about pitch angle^2 / 2.
+        let angle = (2.0 * SPACING * (column as f32 + 3.0) / pitch).sqrt();
+        let mut at = |value: f32| value + 0.009 * random.next();
+        let [x, y] = [angle.cos(), angle.sin()].map(|part| at(pitch * angle * part));
+        let z = at(SPACING * row as f32);
+        PackedParticle([x, y, z, 1.0, 0.0, 0.0, 0.0, 0.0])
+    }
+
+    fn search<'a>(
+        tree: &'a TileTree,
+        (states, particles): (&'a [PackedParticle], &'a [u32]),
+        (begins_paths, passed, span): (bool, f32, f32),
+    ) -> SurfaceSearch<'a> {
+        let kernels = Kernels::Reference;
+        let distance = 1.4 * SPACING;
+        SurfaceSearch { tree, states, particles, begins_paths, passed, span, distance, kernels }
+    }
+
+    #[test]
+    fn a_search_for_strays_misses_no_point_that_a_full_one_finds() {
+        let text = format!(
+            "version = 1\n[[generate]]\nshape = \"cloth\"\ncolumns = {SIDE}\nrows = {SIDE}\nspacing = {SPACING}\n"
+        );
+        let model = Scene::from_toml(&text, "test").unwrap().model();
+        let particles = load::slots(&model);
+        let kernels = Kernels::Reference;
+        let new =
+            || SurfaceContacts::new(&model, &particles, (SPACING, kernels), 8 * particles.len());
+        let (mut found_count, mut missed) = (0, 0);
+        for seed in 0..100 {
+            let mut random = Random(seed);
+            let mut states: Vec<_> =
+                particles.iter().map(|one| rolled(*one, &mut random)).collect();
+            let mut tree = TileTree::new(particles.len());
+            tree.begin_paths(&states, kernels);
+            tree.refit([0.0, SPAN], kernels);
+            let mut contacts = new();
+            let all = search(&tree, (&states, &particles), (true, 0.0, SPAN));
+            assert!(contacts.find(&all).is_continue());
+
+            tree.place(PASSED, kernels, &mut states);
+            tree.strays.fill(0);
+            for (slot, state) in states.iter_mut().enumerate() {
+                if random.next() > 0.9 {
+                    tree.strays[slot / TILE] |= 1 << (slot % TILE);
+                    for axis in 0..3 {
+                        state.0[axis] += 0.006 * random.next();
+                        state.0[axis + 4] = 0.0005 * random.next();
+                    }
+                }
+            }
+            tree.follow_strays(&states, PASSED);
+            tree.refit([PASSED, SPAN], kernels);
+            let rest = SPAN - PASSED;
+            let some = search(&tree, (&states, &particles), (false, PASSED, rest));
+            assert!(contacts.find(&some).is_continue());
+
+            let mut fresh_tree = TileTree::new(particles.len());
+            fresh_tree.begin_paths(&states, kernels);
+            fresh_tree.refit([0.0, rest], kernels);
+            let mut fresh = new();
+            let all = search(&fresh_tree, (&states, &particles), (true, 0.0, rest));
+            assert!(fresh.find(&all).is_continue());
+
+            for Candidate { slot, triangle, .. } in &fresh.candidates {
+                let view = View { particles: &states, slot: *slot, time: 0.0 };
+                let corners = fresh.surface.place(*triangle, view);
+                let nearest = Nearest::new(corners);
+                if nearest.mean(corners).length() > REACH * SPACING {
+                    continue;
+                }
+                let newest = contacts.newest[*slot as usize];
+                let is_known = has_candidate(&contacts.candidates, newest, |known| {
+                    contacts.surface.shares(*triangle, nearest.feature, known)
+                });
+                found_count += 1;
+                missed += usize::from(!is_known);
+            }
+        }
+        assert!(found_count > 4_000, "{found_count}");
+        assert_eq!(missed, 0, "of {found_count}");
+    }
 }

@@ -8,6 +8,8 @@ use crate::kernels::lanes::{Lanes8, PackedParticle, Wide, axes};
 pub(super) const TILE: usize = TILE_LENGTH as usize;
 /// The same number for slots.
 pub(super) const TILE_LENGTH: u32 = 16;
+// The bits of a tile are a `u16`.
+const _: () = assert!(TILE_LENGTH == u16::BITS);
 /// A number for each entry of a tile.
 pub(super) type TileColumn = [Lanes8; TILE / 8];
 

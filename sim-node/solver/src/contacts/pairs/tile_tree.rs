@@ -354,3 +354,56 @@ impl<'a, W: Wide> TilePair<'a, W> {
         dot(apart, apart) < self.query.distance * self.query.distance
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 100 particles that move along a line, the last tile of which is not full.
+    fn states() -> Vec<PackedParticle> {
+        let state = |index: u16| {
+            let (x, d) = (f32::from(index * 37 % 100), f32::from(index * 13 % 7) - 3.0);
+            PackedParticle([x, 0.0, 0.0, 1.0, d, 0.0, 0.0, 0.0])
+        };
+        let padding = [PackedParticle([f32::NAN; 8]); 12];
+        (0..100).map(state).chain(padding).collect()
+    }
+
+    fn found(tree: &mut TileTree, query: Query, kernels: Kernels) -> Vec<[u32; 2]> {
+        let mut pairs = Vec::new();
+        let search = tree.search(query, kernels, &|_| [0; TILE], &mut |pair| {
+            pairs.push(pair);
+            Search::Continue(())
+        });
+        assert!(search.is_continue());
+        pairs
+    }
+
+    #[test]
+    fn a_search_for_strays_finds_all_their_pairs_in_the_order_of_a_full_one() {
+        let states = states();
+        for kernels in Kernels::available() {
+            let mut tree = TileTree::new(100);
+            tree.begin_paths(&states, kernels);
+            let query = Query { times: [0.0, 1.0], distance: 2.5 };
+            tree.refit(query.times, kernels);
+            let all = found(&mut tree, query, kernels);
+            assert!(all.is_sorted_by_key(|pair| search_order(*pair)), "{kernels:?}");
+            let near = |[a, b]: [u32; 2]| {
+                let [[x_a, d_a], [x_b, d_b]] =
+                    [a, b].map(|slot| [0, 4].map(|field| states[slot as usize].0[field]));
+                let (now, later) = (x_b - x_a, x_b - x_a + d_b - d_a);
+                now.signum() != later.signum() || now.abs().min(later.abs()) < query.distance
+            };
+            let pairs = (0..100).flat_map(|a| (a + 1..100).map(move |b| [a, b]));
+            assert_eq!(all.len(), pairs.filter(|pair| near(*pair)).count(), "{kernels:?}");
+
+            tree.strays = vec![0, 0b1001, 0, 1 << 15, 0, 0, 0b1000];
+            let has_stray = |pair: &[u32; 2]| pair.iter().any(|slot| tree.is_stray(*slot));
+            let expected: Vec<_> = all.iter().copied().filter(has_stray).collect();
+            assert!(expected.len() > 10 && expected.len() < all.len());
+            tree.refit(query.times, kernels);
+            assert_eq!(found(&mut tree, query, kernels), expected, "{kernels:?}");
+        }
+    }
+}

@@ -87,3 +87,54 @@ fn can_touch(surface: &Surface, states: &[PackedParticle], [slot, triangle]: [u3
         && !surface.has_corner(triangle, slot)
         && (is_free(slot) || surface.corners[triangle as usize].iter().any(|one| is_free(*one)))
 }
+
+#[cfg(test)]
+mod tests {
+    //! Eight triangles at once against one after the other.
+    use super::super::super::load;
+    use super::super::super::tile_tree::TileTree;
+    use super::*;
+    use crate::kernels::Kernels;
+    use crate::scene::Scene;
+
+    #[test]
+    fn eight_triangles_at_once_are_near_as_one_after_the_other() {
+        let text =
+            "version = 1\n[[generate]]\nshape = \"cloth\"\ncolumns = 4\nrows = 4\nspacing = 0.5\n";
+        let model = Scene::from_toml(text, "test").unwrap().model();
+        let particles = load::slots(&model);
+        let surface = Surface::new(&model, &particles, load::triangles(&model, &particles));
+        let (mut random, tree) = (1_u32, TileTree::new(16));
+        let mut next = |limit: u32| {
+            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (random >> 8) % limit
+        };
+        let mut face_count = 0;
+        for _ in 0..200 {
+            let mut number = || next(1 << 16) as f32 / f32::from(1_u16 << 15) - 1.0;
+            let states = [0; 16].map(|_| PackedParticle([0; 8].map(|_| number())));
+            // Two groups of eight, and a rest.
+            let pairs = [0; 19].map(|_| [next(16), next(18)]);
+            for kernels in Kernels::available() {
+                let search = SurfaceSearch {
+                    tree: &tree,
+                    states: &states,
+                    particles: &particles,
+                    begins_paths: true,
+                    passed: 0.0,
+                    span: 0.5,
+                    distance: 0.8,
+                    kernels,
+                };
+                let (surface, search) = (&surface, &search);
+                let mut features = Vec::new();
+                kernels.run(NearbyWork { surface, search, pairs: &pairs, features: &mut features });
+                let expected: Vec<_> =
+                    pairs.iter().map(|pair| nearby(surface, search, *pair)).collect();
+                assert_eq!(features, expected, "{kernels:?}");
+                face_count += features.iter().filter(|one| **one == Some(Feature::Face)).count();
+            }
+        }
+        assert!(face_count > 50, "{face_count}");
+    }
+}

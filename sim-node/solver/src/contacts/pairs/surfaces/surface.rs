@@ -301,3 +301,35 @@ fn sides(model: &Model, particles: &[u32], triangles: &[[u32; 3]]) -> Vec<[Optio
     }
     sides
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::load;
+    use super::*;
+    use crate::scene::Scene;
+
+    #[test]
+    fn the_corners_behind_edges_follow_tears() {
+        let text =
+            "version = 1\n[[generate]]\nshape = \"cloth\"\ncolumns = 4\nrows = 4\nspacing = 0.5\n";
+        let model = Scene::from_toml(text, "test").unwrap().model();
+        let slots = load::slots(&model);
+        let mut surface = Surface::new(&model, &slots, load::triangles(&model, &slots));
+        let whole = surface.opposites.clone();
+        let mut is_torn = vec![false; model.constraints.len()];
+        is_torn[10] = true;
+        surface.follow_tears(&is_torn);
+        let torn: Vec<_> = (0..18).filter(|triangle| !surface.is_whole(*triangle)).collect();
+        assert!(!torn.is_empty());
+        for (triangle, corners) in (0_u32..).zip(&surface.corners) {
+            for edge in 0..3 {
+                let opposite = surface.opposites[triangle as usize][edge];
+                let neighbor = surface.neighbor(triangle, edge);
+                assert_eq!(opposite, neighbor.map_or(corners[edge], |one| one.opposite));
+            }
+        }
+        assert_ne!(surface.opposites, whole);
+        surface.follow_tears(&vec![false; model.constraints.len()]);
+        assert_eq!(surface.opposites, whole);
+    }
+}

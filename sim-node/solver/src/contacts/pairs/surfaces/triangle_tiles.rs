@@ -23,7 +23,7 @@ const TILE_PAIRS_MAX: usize = 4096;
 pub(super) struct TriangleTiles {
     tiles: Vec<TriangleTile>,
     boxes: BoxTree,
-    /// By tile: a bit for each triangle with a stray at a corner.
+    /// By tile: a bit for each whole triangle with a stray at a corner. All triangles have one if all paths begin.
     strays: Vec<u16>,
     /// Where the triangles of each tile are, if the running search has needed it.
     placed: Vec<PlacedTile>,
@@ -43,11 +43,6 @@ impl TriangleTiles {
         }
     }
 
-    /// True if a corner of a triangle has left its path since the last search.
-    pub(super) fn has_stray(&self, triangle: u32) -> bool {
-        self.strays[(triangle / TILE_LENGTH) as usize] & (1 << (triangle % TILE_LENGTH)) != 0
-    }
-
     /// Replaces the spheres and boxes of tiles with strays by those of their paths.
     pub(super) fn refit(&mut self, surface: &Surface, search: &SurfaceSearch<'_>) {
         self.mark_strays(surface, search);
@@ -60,8 +55,7 @@ impl TriangleTiles {
 
     /// Marks the triangles with strays at their corners.
     fn mark_strays(&mut self, surface: &Surface, search: &SurfaceSearch<'_>) {
-        if search.passed == 0.0 {
-            // The paths of all particles begin now.
+        if search.begins_paths {
             return mark_all(&mut self.strays, surface.corners.len());
         }
         self.strays.fill(0);
@@ -73,8 +67,8 @@ impl TriangleTiles {
     }
 
     /// Passes every particle and triangle to `accept` that may come nearer than the distance of the search, if there is a
-    /// stray among the particle and the corners of the triangle. `except` has, for a tile of particles and one of triangles, a bit for each triangle
-    /// that a particle leaves out.
+    /// stray among the particle and the corners of the triangle. `except` has, for a tile of particles and one of
+    /// triangles, a bit for each triangle that a particle leaves out.
     pub(super) fn search(
         &mut self,
         (surface, wanted): (&Surface, Wanted),
@@ -134,6 +128,8 @@ pub(in super::super) struct SurfaceSearch<'a> {
     pub(in super::super) states: &'a [PackedParticle],
     /// By slot: the particle.
     pub(in super::super) particles: &'a [u32],
+    /// True if all paths begin now, so that all particles are strays.
+    pub(in super::super) begins_paths: bool,
     /// Number of displacements from the beginning of the paths until now.
     pub(in super::super) passed: f32,
     /// Number of displacements that are left.
