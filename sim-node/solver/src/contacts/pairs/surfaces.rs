@@ -341,12 +341,13 @@ mod tests {
             tree.place(PASSED, kernels, &mut states);
             tree.strays.fill(0);
             for (slot, state) in states.iter_mut().enumerate() {
-                if random.next() > 0.9 {
-                    tree.strays[slot / TILE] |= 1 << (slot % TILE);
-                    for axis in 0..3 {
-                        state.0[axis] += 0.006 * random.next();
-                        state.0[axis + 4] = 0.0005 * random.next();
-                    }
+                if random.next() < 0.9 {
+                    continue;
+                }
+                tree.strays[slot / TILE] |= 1 << (slot % TILE);
+                for axis in 0..3 {
+                    state.0[axis] += 0.006 * random.next();
+                    state.0[axis + 4] = 0.0005 * random.next();
                 }
             }
             tree.follow_strays(&states, PASSED);

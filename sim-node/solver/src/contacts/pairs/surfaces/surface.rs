@@ -321,12 +321,12 @@ mod tests {
         surface.follow_tears(&is_torn);
         let torn: Vec<_> = (0..18).filter(|triangle| !surface.is_whole(*triangle)).collect();
         assert!(!torn.is_empty());
-        for (triangle, corners) in (0_u32..).zip(&surface.corners) {
-            for edge in 0..3 {
-                let opposite = surface.opposites[triangle as usize][edge];
-                let neighbor = surface.neighbor(triangle, edge);
-                assert_eq!(opposite, neighbor.map_or(corners[edge], |one| one.opposite));
-            }
+        for (triangle, opposites) in (0_u32..).zip(&surface.opposites) {
+            let corners = surface.corners[triangle as usize];
+            let expected = [0, 1, 2].map(|edge| {
+                surface.neighbor(triangle, edge).map_or(corners[edge], |one| one.opposite)
+            });
+            assert_eq!(*opposites, expected);
         }
         assert_ne!(surface.opposites, whole);
         surface.follow_tears(&vec![false; model.constraints.len()]);
