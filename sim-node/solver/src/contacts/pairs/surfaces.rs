@@ -10,6 +10,8 @@ mod faces;
 mod nearby;
 mod nearest;
 mod placed_tile;
+#[cfg(test)]
+mod samples;
 mod surface;
 mod touching;
 mod triangle_tile;
@@ -275,8 +277,8 @@ fn near_at_load(
 mod tests {
     //! Searches for strays against searches for all.
     use super::super::REACH;
+    use super::samples::{Random, sheet};
     use super::*;
-    use crate::scene::Scene;
 
     const SIDE: u32 = 24;
     const SPACING: f32 = 0.02;
@@ -284,23 +286,13 @@ mod tests {
     const SPAN: f32 = 8.0;
     const PASSED: f32 = 3.0;
 
-    /// Numbers from -1 to 1.
-    struct Random(u32);
-
-    impl Random {
-        fn next(&mut self) -> f32 {
-            self.0 = self.0.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (self.0 >> 8) as f32 / (1_u32 << 23) as f32 - 1.0
-        }
-    }
-
     /// A particle at rest in a rolled sheet whose layers are 25 mm apart, in disorder.
     fn rolled(particle: u32, random: &mut Random) -> PackedParticle {
         let (column, row) = (particle % SIDE, particle / SIDE);
         let pitch = 0.025 / std::f32::consts::TAU;
         // The length of the spiral up to an angle is about pitch angle^2 / 2.
         let angle = (2.0 * SPACING * (column as f32 + 3.0) / pitch).sqrt();
-        let mut at = |value: f32| value + 0.009 * random.next();
+        let mut at = |value: f32| value + 0.009 * random.number();
         let [x, y] = [angle.cos(), angle.sin()].map(|part| at(pitch * angle * part));
         let z = at(SPACING * row as f32);
         PackedParticle([x, y, z, 1.0, 0.0, 0.0, 0.0, 0.0])
@@ -318,10 +310,7 @@ mod tests {
 
     #[test]
     fn a_search_for_strays_misses_no_point_that_a_full_one_finds() {
-        let text = format!(
-            "version = 1\n[[generate]]\nshape = \"cloth\"\ncolumns = {SIDE}\nrows = {SIDE}\nspacing = {SPACING}\n"
-        );
-        let model = Scene::from_toml(&text, "test").unwrap().model();
+        let model = sheet(SIDE, SPACING);
         let particles = load::slots(&model);
         let kernels = Kernels::Reference;
         let new =
@@ -341,13 +330,13 @@ mod tests {
             tree.place(PASSED, kernels, &mut states);
             tree.strays.fill(0);
             for (slot, state) in states.iter_mut().enumerate() {
-                if random.next() < 0.9 {
+                if random.number() < 0.9 {
                     continue;
                 }
                 tree.strays[slot / TILE] |= 1 << (slot % TILE);
                 for axis in 0..3 {
-                    state.0[axis] += 0.006 * random.next();
-                    state.0[axis + 4] = 0.0005 * random.next();
+                    state.0[axis] += 0.006 * random.number();
+                    state.0[axis + 4] = 0.0005 * random.number();
                 }
             }
             tree.follow_strays(&states, PASSED);

@@ -142,13 +142,12 @@ fn negated<W: Wide>([x, y, z]: [W; 3]) -> [W; 3] {
 #[cfg(test)]
 mod tests {
     //! Eight nearest points at once against one after the other.
-    use super::super::load;
     use super::super::nearest::{Feature, Nearest};
+    use super::super::samples::{Random, sheet, surface_of};
     use super::super::surface::{Found, View, separation};
     use super::*;
     use crate::kernels::Kernels;
     use crate::kernels::lanes::LaneWork;
-    use crate::scene::Scene;
 
     struct Work<'a>(&'a Surface, &'a [PackedParticle], ([u32; 8], [u32; 8]));
 
@@ -186,22 +185,12 @@ mod tests {
 
     #[test]
     fn eight_points_at_once_have_the_bits_of_one_after_the_other() {
-        let text =
-            "version = 1\n[[generate]]\nshape = \"cloth\"\ncolumns = 4\nrows = 4\nspacing = 0.5\n";
-        let model = Scene::from_toml(text, "test").unwrap().model();
-        let slots = load::slots(&model);
         // 18 triangles.
-        let surface = Surface::new(&model, &slots, load::triangles(&model, &slots));
-        let mut random = 1_u32;
-        let mut next = |limit: u32| {
-            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (random >> 8) % limit
-        };
-        let mut on_face_count = 0;
+        let (surface, _) = surface_of(&sheet(4, 0.5));
+        let (mut random, mut on_face_count) = (Random(1), 0);
         for _ in 0..500 {
-            let mut number = || next(1 << 16) as f32 / f32::from(1_u16 << 15) - 1.0;
-            let states = [0; 16].map(|_| PackedParticle([0; 8].map(|_| number())));
-            let pairs = ([0; 8].map(|_| next(16)), [0; 8].map(|_| next(18)));
+            let states = [0; 16].map(|_| PackedParticle([0; 8].map(|_| random.number())));
+            let pairs = ([0; 8].map(|_| random.below(16)), [0; 8].map(|_| random.below(18)));
             let expected: Vec<_> =
                 (0..8).map(|lane| one(&surface, &states, pairs.0[lane], pairs.1[lane])).collect();
             on_face_count += expected.iter().flatten().count();

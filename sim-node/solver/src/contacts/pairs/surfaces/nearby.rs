@@ -91,30 +91,20 @@ fn can_touch(surface: &Surface, states: &[PackedParticle], [slot, triangle]: [u3
 #[cfg(test)]
 mod tests {
     //! Eight triangles at once against one after the other.
-    use super::super::super::load;
     use super::super::super::tile_tree::TileTree;
+    use super::super::samples::{Random, sheet, surface_of};
     use super::*;
     use crate::kernels::Kernels;
-    use crate::scene::Scene;
 
     #[test]
     fn eight_triangles_at_once_are_near_as_one_after_the_other() {
-        let text =
-            "version = 1\n[[generate]]\nshape = \"cloth\"\ncolumns = 4\nrows = 4\nspacing = 0.5\n";
-        let model = Scene::from_toml(text, "test").unwrap().model();
-        let particles = load::slots(&model);
-        let surface = Surface::new(&model, &particles, load::triangles(&model, &particles));
-        let (mut random, tree) = (1_u32, TileTree::new(16));
-        let mut next = |limit: u32| {
-            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (random >> 8) % limit
-        };
+        let (surface, particles) = surface_of(&sheet(4, 0.5));
+        let (mut random, tree) = (Random(1), TileTree::new(16));
         let mut face_count = 0;
         for _ in 0..200 {
-            let mut number = || next(1 << 16) as f32 / f32::from(1_u16 << 15) - 1.0;
-            let states = [0; 16].map(|_| PackedParticle([0; 8].map(|_| number())));
+            let states = [0; 16].map(|_| PackedParticle([0; 8].map(|_| random.number())));
             // Two groups of eight, and a rest.
-            let pairs = [0; 19].map(|_| [next(16), next(18)]);
+            let pairs = [0; 19].map(|_| [random.below(16), random.below(18)]);
             for kernels in Kernels::available() {
                 let search = SurfaceSearch {
                     tree: &tree,

@@ -304,17 +304,12 @@ fn sides(model: &Model, particles: &[u32], triangles: &[[u32; 3]]) -> Vec<[Optio
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::load;
-    use super::*;
-    use crate::scene::Scene;
+    use super::super::samples::{sheet, surface_of};
 
     #[test]
     fn the_corners_behind_edges_follow_tears() {
-        let text =
-            "version = 1\n[[generate]]\nshape = \"cloth\"\ncolumns = 4\nrows = 4\nspacing = 0.5\n";
-        let model = Scene::from_toml(text, "test").unwrap().model();
-        let slots = load::slots(&model);
-        let mut surface = Surface::new(&model, &slots, load::triangles(&model, &slots));
+        let model = sheet(4, 0.5);
+        let (mut surface, _) = surface_of(&model);
         let whole = surface.opposites.clone();
         let mut is_torn = vec![false; model.constraints.len()];
         is_torn[10] = true;
