@@ -227,10 +227,7 @@ impl ParticleContacts {
     /// Finds the particles that are not where the candidates expect them at the end of the substep. Returns true if the
     /// candidates no longer hold.
     fn find_strays(&mut self, store: &ParticleStore, substep: Substep) -> bool {
-        let Some(begin) = self.paths_begin_at else {
-            self.tree.mark_all();
-            return true;
-        };
+        let Some(begin) = self.paths_begin_at else { return true };
         self.tree.strays.fill(0);
         let count = (substep.index - begin.index + 1) as f32;
         // Less than half of the margin for each particle, so that rounding loses no pair.

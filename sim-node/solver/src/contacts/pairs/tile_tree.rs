@@ -39,11 +39,9 @@ impl TileTree {
             (vec![Bounds::EMPTY; tiles.len()], vec![Bounds::EMPTY; tiles.len()]);
         let boxes = BoxTree::new(tiles.len());
         let tile_pairs = Vec::with_capacity(TILE_PAIRS_MAX);
-        let strays = vec![0; tiles.len()];
-        let mut tree =
-            Self { tiles, boxes, starts, displacements, strays, particle_count: count, tile_pairs };
-        tree.mark_all();
-        tree
+        let mut strays = vec![0; tiles.len()];
+        mark_all(&mut strays, count);
+        Self { tiles, boxes, starts, displacements, strays, particle_count: count, tile_pairs }
     }
 
     /// Makes a tree of particles at rest where they are at load.
@@ -61,16 +59,11 @@ impl TileTree {
         self.strays[(slot / TILE_LENGTH) as usize] & (1 << (slot % TILE_LENGTH)) != 0
     }
 
-    /// Makes all particles strays.
-    pub(super) fn mark_all(&mut self) {
-        mark_all(&mut self.strays, self.particle_count);
-    }
-
     /// Gives all particles the paths that begin now. They are strays to the next search.
     pub(super) fn begin_paths(&mut self, states: &[PackedParticle], kernels: Kernels) {
         let (states, _) = states.as_chunks();
         kernels.run(BeginWork { tiles: &mut self.tiles, states });
-        self.mark_all();
+        mark_all(&mut self.strays, self.particle_count);
     }
 
     /// Replaces the paths of strays by those on which they are now, after `time` displacements.
