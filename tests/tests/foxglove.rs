@@ -111,6 +111,22 @@ fn a_client_receives_constraints_triangles_and_colliders_whenever_it_subscribes(
 }
 
 #[test]
+fn a_client_may_advertise_any_topic_but_publish_only_commands() {
+    let setup = Setup::start(&["--allow-commands"]);
+    let first_error = |topic: &str| {
+        let (mut client, _) = Client::start(&setup.url);
+        client.advertise(1, "/move_base_simple/goal");
+        client.advertise(2, "/commands");
+        client.publish(if topic == "/commands" { 2 } else { 1 }, &json!({ "kind": "jump" }));
+        client.text("status")["message"].as_str().unwrap().to_owned()
+    };
+    let error = first_error("/commands");
+    assert!(error.contains("jump"), "{error}");
+    let error = first_error("/move_base_simple/goal");
+    assert_eq!(error, "this server only accepts /commands, not /move_base_simple/goal");
+}
+
+#[test]
 fn a_push_of_a_client_moves_the_particles_in_its_sphere() {
     let mut setup = Setup::start(&["--allow-commands"]);
     let (mut client, _) = Client::start(&setup.url);

@@ -26,16 +26,14 @@ impl ServerListener for ClientEvents {
         let _sent = self.requests.send(ANY_CLIENT, RequestKind::State);
     }
 
-    fn on_client_advertise(&self, client: Client, channel: &ClientChannel) {
-        if channel.topic != TOPIC {
-            let text = format!("this server only accepts {TOPIC}, not {}", channel.topic);
-            self.bridge.complain(&client, text);
-        }
-    }
-
+    /// A foreign topic is an error only when something is published on it: viewers advertise topics of their own,
+    /// such as the goals of a 3D panel.
     fn on_message_data(&self, client: Client, channel: &ClientChannel, payload: &[u8]) {
         if channel.topic == TOPIC {
             self.bridge.accept_published(client, payload);
+        } else {
+            let text = format!("this server only accepts {TOPIC}, not {}", channel.topic);
+            self.bridge.complain(&client, text);
         }
     }
 
