@@ -179,20 +179,18 @@ impl Meeting<'_> {
         number: usize,
     ) {
         let (first, _) = self.path();
-        let mut room = mesh.room(&first);
-        let mut triangles = mesh.list(lists, number, &room);
-        if room.is_free(triangles) {
+        let mut around = mesh.surroundings(lists, number, &first);
+        if around.are_free() {
             return;
         }
         let mut surface = *surface;
         for push_count in 0..=PUSHES_MAX {
             let (path, inverse_mass) = self.path();
             let made = if push_count == 0 { path } else { path_to_end(&first, &path) };
-            if !mesh.is_within(&room, &made) {
-                room = mesh.room(&made);
-                triangles = mesh.list(lists, number, &room);
+            if !mesh.is_within(&around, &made) {
+                around = mesh.surroundings(lists, number, &made);
             }
-            let stop = mesh.stop(&made, &room, triangles, push_count);
+            let stop = mesh.stop(&made, &around, push_count);
             if stop.is_some() && push_count == 0 {
                 self.reaction.contacts += 1;
             }

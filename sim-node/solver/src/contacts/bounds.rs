@@ -63,8 +63,21 @@ impl Bounds {
         self.contains(other.min) && self.contains(other.max)
     }
 
+    /// Sum of the largest coordinate on each axis; 0 for an empty box.
+    pub(super) fn magnitude(&self) -> f32 {
+        let [x, y, z] = axes(|axis| -lesser(self.min[axis], -self.max[axis]));
+        if x + y + z > 0.0 { x + y + z } else { 0.0 }
+    }
+
     pub(super) fn center(&self) -> [f32; 3] {
         axes(|axis| 0.5 * (self.min[axis] + self.max[axis]))
+    }
+
+    /// Distance of a point in the box from the nearest side; negative outside.
+    pub(super) fn depth_of(&self, point: [f32; 3]) -> f32 {
+        let depths =
+            axes(|axis| lesser(point[axis] - self.min[axis], self.max[axis] - point[axis]));
+        lesser(depths[0], lesser(depths[1], depths[2]))
     }
 
     /// Square of the distance of a point from the box.

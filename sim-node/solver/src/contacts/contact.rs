@@ -245,19 +245,17 @@ impl Contacts {
                 continue;
             }
             let before = self.bounce(index);
-            let mut room = mesh.room(&path);
             let number = particles.first() + index;
-            let mut triangles = mesh.list(&mut lists, number, &room);
-            if room.is_free(triangles) {
+            let mut around = mesh.surroundings(&mut lists, number, &path);
+            if around.are_free() {
                 continue;
             }
             for push_count in 0..=PUSHES_MAX {
                 let path = particles.path(index);
-                if !mesh.is_within(&room, &path) {
-                    room = mesh.room(&path);
-                    triangles = mesh.list(&mut lists, number, &room);
+                if !mesh.is_within(&around, &path) {
+                    around = mesh.surroundings(&mut lists, number, &path);
                 }
-                let stop = mesh.stop(&path, &room, triangles, push_count);
+                let stop = mesh.stop(&path, &around, push_count);
                 if stop.is_some() && push_count == 0 {
                     count(reaction.as_deref_mut());
                 }

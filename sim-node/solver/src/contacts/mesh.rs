@@ -7,6 +7,7 @@
 //!
 //! A solid mesh also has an inside. A particle there leaves it at the nearest point of the surface.
 
+mod cells;
 pub(crate) mod collision_mesh;
 pub(crate) mod inside;
 pub(crate) mod near;
@@ -31,7 +32,7 @@ use triangle::{Gap, MeshPath, Touch, Triangle};
 /// Least distance that particles keep from a mesh, in tolerances. It exceeds the rounding of a
 /// particle on the surface, so that its side is certain.
 const SKIN: f32 = 8.0;
-/// Length of a push for which there is room, relative to that of the path. Most paths run along the mesh and
+/// Length of a push that the surroundings allow for, relative to that of the path. Most paths run along the mesh and
 /// are pushed less.
 const PUSH_SHARE: f32 = 0.25;
 /// Number of further substeps for which triangles near a particle are listed.
@@ -82,35 +83,32 @@ impl PlacedMesh {
         self.gap.tolerance
     }
 
-    /// Returns the room for the pushes of a particle with this path.
-    pub(crate) fn room(&self, path: &SubstepPath) -> Room {
+    /// Finds what is around a path of a particle, which its number names, and around it after some pushes.
+    pub(crate) fn surroundings<'a>(
+        &self,
+        lists: &'a mut NearMeshes,
+        particle: usize,
+        path: &SubstepPath,
+    ) -> Surroundings<'a> {
         let path = self.path(path);
         let length = path.motion.dot(path.motion).sqrt();
         let bounds = Bounds::around([path.start.to_array(), path.end().to_array()]);
         let rounding = self.gap.tolerance + 2.0 * path.rounding;
         let ends = bounds.grown(PUSH_SHARE * length + rounding);
-        Room { ends, length, starts_inside: self.mesh.is_inside(path.start, self.gap.tolerance) }
-    }
-
-    /// True if a path after some pushes is still within the room of the first one.
-    pub(crate) fn is_within(&self, room: &Room, path: &SubstepPath) -> bool {
-        room.ends.contains(self.path(path).end().to_array())
-    }
-
-    /// Lists the triangles that a particle can touch, which its number names.
-    pub(crate) fn list<'a>(
-        &self,
-        lists: &'a mut NearMeshes,
-        particle: usize,
-        room: &Room,
-    ) -> &'a NearTriangles {
         let query = NearQuery {
             collider: self.mesh.collider,
             particle,
-            bounds: self.search_box(room),
-            margin: SUBSTEPS_AHEAD * room.length + self.gap.tolerance,
+            bounds: self.search_box(&ends),
+            margin: SUBSTEPS_AHEAD * length + self.gap.tolerance,
         };
-        lists.find(&self.mesh.tree, &query)
+        let triangles = lists.find(&self.mesh.tree, &query);
+        let starts_inside = self.mesh.is_inside(path.start, triangles, self.gap.tolerance);
+        Surroundings { ends, triangles, starts_inside }
+    }
+
+    /// True if a path after some pushes ends within the surroundings of the first one.
+    pub(crate) fn is_within(&self, around: &Surroundings<'_>, path: &SubstepPath) -> bool {
+        around.ends.contains(self.path(path).end().to_array())
     }
 
     /// Returns the depth of a point inside a solid, or `None` if it is outside or the mesh is not solid.
@@ -124,12 +122,11 @@ impl PlacedMesh {
     pub(crate) fn stop(
         &self,
         path: &SubstepPath,
-        room: &Room,
-        triangles: &NearTriangles,
+        around: &Surroundings<'_>,
         push_count: usize,
     ) -> Option<Stop> {
         let path = self.path(path);
-        if room.starts_inside {
+        if around.starts_inside {
             return self.way_out(&path, push_count).map(Stop::Push);
         }
         let is_resolved = |touch: &Touch| match push_count {
@@ -138,7 +135,7 @@ impl PlacedMesh {
             _ => touch.is_clear(self.gap),
         };
         let mut first: Option<Touch> = None;
-        self.for_each(room, triangles, |triangle| {
+        self.for_each(around, |triangle| {
             if let Some(touch) = triangle.touch(&path, self.gap).filter(&is_resolved)
                 && first.is_none_or(|first| touch.is_before(&first))
             {
@@ -174,18 +171,18 @@ impl PlacedMesh {
         MeshPath { start, motion, rounding }
     }
 
-    /// The box in which the triangles lie that the paths of a particle can touch.
-    fn search_box(&self, room: &Room) -> Bounds {
-        room.ends.grown(self.gap.distance + self.gap.tolerance)
+    /// The box in which the triangles lie that paths with these ends can touch.
+    fn search_box(&self, ends: &Bounds) -> Bounds {
+        ends.grown(self.gap.distance + self.gap.tolerance)
     }
 
-    fn for_each(&self, room: &Room, triangles: &NearTriangles, mut visit: impl FnMut(&Triangle)) {
+    fn for_each(&self, around: &Surroundings<'_>, mut visit: impl FnMut(&Triangle)) {
         let tree = &self.mesh.tree;
         let mut visit_index = |index: u32| visit(&tree.triangles[index as usize]);
-        match triangles.listed() {
+        match around.triangles.listed() {
             Some(indices) => indices.iter().copied().for_each(visit_index),
             None => {
-                let _all = tree.search(&self.search_box(room), &mut |index| {
+                let _all = tree.search(&self.search_box(&around.ends), &mut |index| {
                     visit_index(index);
                     ControlFlow::Continue(())
                 });
@@ -203,21 +200,21 @@ pub(crate) enum Stop {
     Hold,
 }
 
-/// The box in which a path ends, also after some pushes. So the triangles that the particle can touch are
-/// known before the first one.
+/// What is around the paths of a particle in a substep.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Room {
+pub(crate) struct Surroundings<'a> {
+    /// The box in which a path ends, also after some pushes. So the triangles that the particle can touch are known
+    /// before the first one.
     ends: Bounds,
-    /// Length of the first path.
-    length: f32,
+    triangles: &'a NearTriangles,
     /// True if the paths start inside a solid.
     starts_inside: bool,
 }
 
-impl Room {
+impl Surroundings<'_> {
     /// True if no contact is possible: no triangle is near, and the paths start outside.
-    pub(crate) fn is_free(&self, triangles: &NearTriangles) -> bool {
-        triangles.are_none() && !self.starts_inside
+    pub(crate) fn are_free(&self) -> bool {
+        self.triangles.are_none() && !self.starts_inside
     }
 }
 

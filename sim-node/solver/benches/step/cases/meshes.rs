@@ -27,6 +27,7 @@ struct Meshes {
     triangles: usize,
     /// From the texts of the scene and the file to a solver.
     load_ms: f64,
+    solid_load_ms: f64,
     /// Median over the steps, for each particle and substep.
     mesh_ns: f64,
     solid_ns: f64,
@@ -40,6 +41,7 @@ impl Row for Meshes {
     const HEADINGS: &'static [&'static str] = &[
         "triangles",
         "load: ms",
+        "solid",
         "mesh: ns a particle and substep",
         "solid",
         "sphere",
@@ -55,6 +57,7 @@ impl Row for Meshes {
         vec![
             self.triangles.to_string(),
             format!("{:.0}", self.load_ms),
+            format!("{:.0}", self.solid_load_ms),
             format!("{:.1}", self.mesh_ns),
             format!("{:.1}", self.solid_ns),
             format!("{:.1}", self.sphere_ns),
@@ -83,9 +86,13 @@ fn measure(case: String, cells: usize) -> Meshes {
         let scene = Scene::from_toml_with_files(text, "bench", &|_| Ok(obj.clone()));
         Solver::new(&scene.unwrap())
     };
-    let mut solver = None;
-    let load_ns = cpu_ns(|| solver = Some(load(&mesh)));
-    let (mut solver, mut on_solid) = (solver.unwrap(), load(&(mesh + "solid = true\n")));
+    let timed_load = |text: &str| {
+        let mut solver = None;
+        let load_ns = cpu_ns(|| solver = Some(load(text)));
+        (solver.unwrap(), load_ns / 1e6)
+    };
+    let (mut solver, load_ms) = timed_load(&mesh);
+    let (mut on_solid, solid_load_ms) = timed_load(&(mesh + "solid = true\n"));
     let sphere =
         "[[collider]]\nfriction = 0.5\nshape = \"sphere\"\nradius = 0.302\ncenter = [0, 0, 0]\n";
     let [mut on_sphere, mut free] = [sphere, ""]
@@ -100,7 +107,8 @@ fn measure(case: String, cells: usize) -> Meshes {
     Meshes {
         case,
         triangles: 12 * cells * cells,
-        load_ms: load_ns / 1e6,
+        load_ms,
+        solid_load_ms,
         mesh_ns,
         solid_ns,
         sphere_ns,

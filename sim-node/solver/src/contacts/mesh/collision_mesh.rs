@@ -3,6 +3,7 @@
 use glam::Vec3;
 
 use super::inside::{Inside, SurfacePoint};
+use super::near::NearTriangles;
 use super::tree::TriangleTree;
 use super::triangle::Triangle;
 use crate::contacts::bounds::Bounds;
@@ -32,7 +33,7 @@ impl CollisionMesh {
         let corners = mesh.triangles.iter().map(|one| corners(&mesh.vertices, *one));
         let triangles = corners.filter_map(|one| Triangle::new(one, height_min)).collect();
         let (tree, order) = TriangleTree::new(triangles);
-        let inside = mesh.is_solid.then(|| Inside::new(mesh, &order));
+        let inside = mesh.is_solid.then(|| Inside::new(mesh, &tree, &order));
         Self { tree, inside, collider, extents: extents(&mesh.vertices) }
     }
 
@@ -42,10 +43,10 @@ impl CollisionMesh {
         self.inside.as_ref()?.surface_near(&self.tree, point, tolerance)
     }
 
-    /// True if a point is inside a solid.
-    pub(super) fn is_inside(&self, point: Vec3, tolerance: f32) -> bool {
-        let is_near = self.inside.is_some() && self.tree.bounds().contains(point.to_array());
-        is_near && self.surface_near(point, tolerance).is_some_and(|surface| surface.height < 0.0)
+    /// True if a point is inside a solid. `near` are the triangles around it.
+    pub(super) fn is_inside(&self, point: Vec3, near: &NearTriangles, tolerance: f32) -> bool {
+        let is_inside = |inside: &Inside| inside.contains(&self.tree, point, near, tolerance);
+        self.inside.as_ref().is_some_and(is_inside)
     }
 }
 

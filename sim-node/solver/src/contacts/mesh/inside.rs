@@ -2,6 +2,8 @@
 
 use glam::{DVec3, Vec3};
 
+use super::cells::{Cells, Place};
+use super::near::NearTriangles;
 use super::tree::{NearestTriangle, TriangleTree};
 use super::triangle::{Feature, NearestPoint};
 use crate::scene::definition::collider::ColliderMesh;
@@ -140,10 +142,17 @@ impl Sides {
     }
 }
 
-/// Tells whether points are inside a closed mesh, by the normal of the nearest part of its surface (Signed Distance
-/// Computation Using the Angle Weighted Pseudonormal: Baerentzen, Aanaes 2005).
+/// Tells whether points are inside a closed mesh.
 #[derive(Debug)]
 pub(super) struct Inside {
+    outwards: Outwards,
+    cells: Cells,
+}
+
+/// Tells the side of points by the normal of the nearest part of the surface (Signed Distance Computation Using the Angle
+/// Weighted Pseudonormal: Baerentzen, Aanaes 2005).
+#[derive(Debug)]
+struct Outwards {
     /// 1 if the triangles face outwards, -1 if they face inwards.
     facing: f32,
     /// By triangle, in the order of the tree.
@@ -169,7 +178,50 @@ pub(super) struct SurfacePoint {
 
 impl Inside {
     /// `mesh` has no flaw ([`find_flaw`]). `order` has, by triangle of the tree, the triangle of the mesh.
-    pub(super) fn new(mesh: &ColliderMesh, order: &[u32]) -> Self {
+    pub(super) fn new(mesh: &ColliderMesh, tree: &TriangleTree, order: &[u32]) -> Self {
+        let outwards = Outwards::new(mesh, order);
+        let height = |point| Some(outwards.surface_point(tree, &tree.nearest(point)?, 0.0).height);
+        let cells = Cells::new(&tree.bounds(), &height);
+        Self { outwards, cells }
+    }
+
+    /// Returns the point of the surface that is nearest to a point, whose rounding is at most `tolerance`. `None` for
+    /// NaN.
+    pub(super) fn surface_near(
+        &self,
+        tree: &TriangleTree,
+        point: Vec3,
+        tolerance: f32,
+    ) -> Option<SurfacePoint> {
+        Some(self.outwards.surface_point(tree, &tree.nearest(point)?, tolerance))
+    }
+
+    /// True if a point, whose rounding is at most `tolerance`, is inside. `near` are the triangles around it: they spare a
+    /// search, and change no result.
+    pub(super) fn contains(
+        &self,
+        tree: &TriangleTree,
+        point: Vec3,
+        near: &NearTriangles,
+        tolerance: f32,
+    ) -> bool {
+        if !tree.bounds().contains(point.to_array()) {
+            return false;
+        }
+        match self.cells.at(point) {
+            Place::Inside => true,
+            Place::Outside => false,
+            Place::NearSurface => {
+                let nearest = near.nearest(tree, point).or_else(|| tree.nearest(point));
+                let surface = nearest.map(|one| self.outwards.surface_point(tree, &one, tolerance));
+                surface.is_some_and(|surface| surface.height < 0.0)
+            }
+        }
+    }
+}
+
+impl Outwards {
+    fn new(mesh: &ColliderMesh, order: &[u32]) -> Self {
         let sides = Sides::new(mesh);
         let edges = |triangle: u32| edges(&sides.places, mesh.triangles[triangle as usize]);
         let at = |vertex: u32| Vec3::from_array(mesh.vertices[vertex as usize]).as_dvec3();
@@ -198,18 +250,17 @@ impl Inside {
         Self { facing: if is_outwards { 1.0 } else { -1.0 }, normals }
     }
 
-    /// Returns the point of the surface that is nearest to a point, whose rounding is at most `tolerance`. `None` for
-    /// NaN.
-    pub(super) fn surface_near(
+    /// Returns the point of the nearest triangle. The rounding of the other point is at most `tolerance`.
+    fn surface_point(
         &self,
         tree: &TriangleTree,
-        point: Vec3,
+        nearest: &NearestTriangle,
         tolerance: f32,
-    ) -> Option<SurfacePoint> {
-        let NearestTriangle { triangle, nearest, .. } = tree.nearest(point)?;
-        let NearestPoint { feature, apart } = nearest;
-        let face = tree.triangles[triangle as usize].normal() * self.facing;
-        let normals = &self.normals[triangle as usize];
+    ) -> SurfacePoint {
+        let NearestPoint { feature, apart } = nearest.nearest;
+        let triangle = nearest.triangle as usize;
+        let face = tree.triangles[triangle].normal() * self.facing;
+        let normals = &self.normals[triangle];
         let distance = apart.dot(apart).sqrt();
         let out = match feature {
             Feature::Edge(edge) if distance > tolerance => normals.edges[edge] * self.facing,
@@ -217,11 +268,11 @@ impl Inside {
                 normals.corners[corner] * self.facing
             }
             // On a face, and so near an edge or corner that the direction from it is rounding.
-            _ => return Some(SurfacePoint { normal: face, height: face.dot(apart) }),
+            _ => return SurfacePoint { normal: face, height: face.dot(apart) },
         };
         // Only the sign depends on angles, whose last digits differ between systems.
         let sign = if out.dot(apart) < 0.0 { -1.0 } else { 1.0 };
-        Some(SurfacePoint { normal: apart * (sign / distance), height: sign * distance })
+        SurfacePoint { normal: apart * (sign / distance), height: sign * distance }
     }
 }
 
@@ -229,8 +280,10 @@ impl Inside {
 #[allow(clippy::unwrap_used, clippy::panic, reason = "a panic is how a test fails")]
 mod tests {
     //! The sign against the winding number, which needs no nearest point.
+    use super::super::near::{NearMeshes, NearQuery};
     use super::super::triangle::Triangle;
     use super::*;
+    use crate::contacts::bounds::Bounds;
 
     const CUBE: [[u32; 3]; 12] = [
         [0, 2, 1],
@@ -298,22 +351,80 @@ mod tests {
         turns.sum()
     }
 
-    #[test]
-    fn a_point_is_inside_where_the_surface_winds_around_it() {
+    /// Numbers from 0 to 1.
+    fn random_numbers() -> impl FnMut() -> f32 {
         let mut state = 1_u32;
-        let mut random = || {
+        move || {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             (state >> 8) as f32 / (1 << 24) as f32
-        };
+        }
+    }
+
+    fn solid(mesh: &ColliderMesh) -> (TriangleTree, Inside) {
+        let corners = |one: &[u32; 3]| one.map(|vertex| mesh.vertices[vertex as usize]);
+        let triangles = mesh.triangles.iter().map(|one| Triangle::new(corners(one), 0.0).unwrap());
+        let (tree, order) = TriangleTree::new(triangles.collect());
+        let inside = Inside::new(mesh, &tree, &order);
+        (tree, inside)
+    }
+
+    /// The box around a point, larger by `reach` on each side, as a query.
+    fn query(point: Vec3, reach: f32) -> NearQuery {
+        let bounds = Bounds::around([point.to_array()]);
+        NearQuery { collider: 0, particle: 0, bounds, margin: reach }
+    }
+
+    #[test]
+    fn triangles_around_a_point_spare_a_search_and_change_no_result() {
+        let mut random = random_numbers();
+        let (mut spared_count, mut inside_count) = (0, 0);
+        for _ in 0..20 {
+            let (tree, inside) = solid(&thorny_ball(&mut random));
+            for _ in 0..500 {
+                let point = Vec3::new(random(), random(), random()) * 2.0 - 1.0;
+                let found = tree.nearest(point).unwrap();
+                let mut lists = NearMeshes::new(1);
+                let near = lists.find(&tree, &query(point, 0.2 * random()));
+                if let Some(listed) = near.nearest(&tree, point) {
+                    assert_eq!(listed.triangle, found.triangle);
+                    assert_eq!(listed.nearest, found.nearest);
+                    spared_count += 1;
+                }
+                let is_inside = inside.contains(&tree, point, near, 1e-6);
+                let surface = inside.surface_near(&tree, point, 1e-6).unwrap();
+                let is_below = surface.height < 0.0;
+                assert_eq!(is_inside, is_below, "{point}");
+                inside_count += u32::from(is_inside);
+            }
+        }
+        assert!(spared_count > 1000 && inside_count > 1000, "{spared_count}, {inside_count}");
+    }
+
+    #[test]
+    fn the_first_of_equally_near_triangles_is_nearest_in_any_order() {
+        let (tree, _) = solid(&cube());
+        let all: Vec<u32> = (0..12).collect();
+        let reversed: Vec<u32> = (0..12).rev().collect();
+        // On axes and diagonals of the cube, inside and outside.
+        for steps in 0..5 * 5 * 5 {
+            let at = [steps % 5, steps / 5 % 5, steps / 25].map(|step| step as f32 - 1.5);
+            let point = Vec3::from_array(at);
+            let expected = tree.nearest(point).unwrap();
+            for order in [&all, &reversed] {
+                let found = tree.nearest_of(order, point, 100.0).unwrap();
+                assert_eq!(found.triangle, expected.triangle, "{point}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_point_is_inside_where_the_surface_winds_around_it() {
+        let mut random = random_numbers();
         let mut inside_count = 0;
         for _ in 0..20 {
             let mesh = thorny_ball(&mut random);
             assert_eq!(find_flaw(&mesh), None);
-            let corners = |one: &[u32; 3]| one.map(|vertex| mesh.vertices[vertex as usize]);
-            let triangles =
-                mesh.triangles.iter().map(|one| Triangle::new(corners(one), 0.0).unwrap());
-            let (tree, order) = TriangleTree::new(triangles.collect());
-            let inside = Inside::new(&mesh, &order);
+            let (tree, inside) = solid(&mesh);
             for _ in 0..500 {
                 let point = Vec3::new(random(), random(), random()) * 2.0 - 1.0;
                 let surface = |point| inside.surface_near(&tree, point, 1e-6).unwrap();

@@ -4,7 +4,9 @@
 
 use std::ops::ControlFlow;
 
-use super::tree::TriangleTree;
+use glam::Vec3;
+
+use super::tree::{NearestTriangle, TriangleTree};
 use crate::contacts::bounds::Bounds;
 
 /// Largest number of triangles in a list. With more, each contact searches the tree.
@@ -15,13 +17,17 @@ const LISTS_MAX: usize = 1 << 17;
 /// The triangles in a box, or more.
 #[derive(Debug, Clone)]
 pub(crate) struct NearTriangles {
+    /// In the frame of the mesh.
+    bounds: Bounds,
     indices: [u32; LISTED_MAX],
     /// None if there are too many of them.
     count: Option<u32>,
 }
 
 impl NearTriangles {
-    const NONE: Self = Self { indices: [0; LISTED_MAX], count: Some(0) };
+    fn none_in(bounds: Bounds) -> Self {
+        Self { bounds, indices: [0; LISTED_MAX], count: Some(0) }
+    }
 
     fn push(&mut self, triangle: u32) -> ControlFlow<()> {
         match self.count {
@@ -43,6 +49,14 @@ impl NearTriangles {
     pub(super) fn listed(&self) -> Option<&[u32]> {
         self.count.map(|count| &self.indices[..count as usize])
     }
+
+    /// Returns the triangle of the mesh that is nearest to a point, if it is certainly one of these: all others are beyond
+    /// the box.
+    pub(super) fn nearest(&self, tree: &TriangleTree, point: Vec3) -> Option<NearestTriangle> {
+        let distance = self.bounds.depth_of(point.to_array());
+        let triangles = self.listed().filter(|_| distance > 0.0)?;
+        tree.nearest_of(triangles, point, distance)
+    }
 }
 
 /// The lists of a worker, each in a place that the number of the particle gives.
@@ -55,15 +69,13 @@ pub(crate) struct NearMeshes {
 #[derive(Debug, Clone)]
 struct List {
     collider: usize,
-    /// Box in the frame of the mesh.
-    bounds: Bounds,
     triangles: NearTriangles,
 }
 
 impl NearMeshes {
     /// Makes room for a number of particles; 0 in a scene without meshes.
     pub(crate) fn new(particle_count: usize) -> Self {
-        let empty = List { collider: 0, bounds: Bounds::EMPTY, triangles: NearTriangles::NONE };
+        let empty = List { collider: 0, triangles: NearTriangles::none_in(Bounds::EMPTY) };
         let count = if particle_count > 0 { particle_count.next_power_of_two() } else { 0 };
         Self { lists: vec![empty; count.min(LISTS_MAX)] }
     }
@@ -74,11 +86,12 @@ impl NearMeshes {
         // Meshes that a particle is near have different places.
         let place = (particle + collider * 0x9e37_79b1) & (self.lists.len() - 1);
         let list = &mut self.lists[place];
-        if list.collider != collider || !list.bounds.contains_box(&bounds) {
-            *list = List { collider, bounds: bounds.grown(margin), triangles: NearTriangles::NONE };
+        if list.collider != collider || !list.triangles.bounds.contains_box(&bounds) {
+            let bounds = bounds.grown(margin);
+            *list = List { collider, triangles: NearTriangles::none_in(bounds) };
             let triangles = &mut list.triangles;
-            let found = tree.search(&list.bounds, &mut |index| {
-                let is_near = tree.triangles[index as usize].meets(&list.bounds);
+            let found = tree.search(&bounds, &mut |index| {
+                let is_near = tree.triangles[index as usize].meets(&bounds);
                 if is_near { triangles.push(index) } else { ControlFlow::Continue(()) }
             });
             if found.is_break() {

@@ -7,6 +7,8 @@ use glam::Vec3;
 use super::triangle::{NearestPoint, Triangle};
 use crate::contacts::bounds::Bounds;
 
+/// Bound on the rounding of two distances from triangles, relative to the coordinates.
+const ROUNDING: f32 = 32.0 * f32::EPSILON;
 /// Largest number of triangles in a leaf.
 const LEAF: usize = 4;
 
@@ -16,6 +18,8 @@ pub(super) struct TriangleTree {
     pub(super) triangles: Vec<Triangle>,
     /// Each node before its children.
     nodes: Vec<Node>,
+    /// Bound on the rounding of two distances of points in the box of the tree.
+    rounding: f32,
 }
 
 #[derive(Debug)]
@@ -39,7 +43,7 @@ impl TriangleTree {
     /// Builds the tree: each node is divided at the median across its longest side. Also returns, by triangle of the
     /// tree, its index in `triangles`.
     pub(super) fn new(triangles: Vec<Triangle>) -> (Self, Vec<u32>) {
-        let mut tree = Self { triangles, nodes: Vec::new() };
+        let mut tree = Self { triangles, nodes: Vec::new(), rounding: 0.0 };
         let mut items: Vec<_> = (0_u32..).zip(&tree.triangles).map(Item::new).collect();
         if !items.is_empty() {
             tree.divide(&mut items, 0);
@@ -47,6 +51,7 @@ impl TriangleTree {
         let order: Vec<_> = items.iter().map(|item| item.triangle).collect();
         let sorted = order.iter().map(|triangle| tree.triangles[*triangle as usize].clone());
         tree.triangles = sorted.collect();
+        tree.rounding = ROUNDING * tree.bounds().magnitude();
         (tree, order)
     }
 
@@ -98,22 +103,34 @@ impl TriangleTree {
         self.nodes.first().map_or(Bounds::EMPTY, |root| root.bounds)
     }
 
-    /// Returns the triangle that is nearest to a point. `None` for NaN.
+    /// Returns the triangle that is nearest to a point, the first one if several are. `None` for NaN.
     pub(super) fn nearest(&self, point: Vec3) -> Option<NearestTriangle> {
-        let mut found = None;
-        // A triangle that is near, so that most boxes can be left out.
-        self.find_nearer(self.leaf_near(point)?, point, &mut found);
+        let mut search = NearestSearch::new(self, point);
+        // A leaf that is near, so that most boxes can be left out.
+        search.examine(self.leaf_near(point)?.triangles());
         let mut at = 0;
         while let Some(node) = self.nodes.get(at) {
-            let is_out = found.as_ref().is_some_and(|found| node.square_to(point) >= found.square);
-            if is_out {
+            if node.square_to(point) > search.reach {
                 at = node.next as usize;
             } else {
-                self.find_nearer(node, point, &mut found);
+                search.examine(node.triangles());
                 at += 1;
             }
         }
-        found
+        search.found
+    }
+
+    /// Returns the one of some triangles that is nearest to a point, if it is certainly nearer than `distance`. It is
+    /// that of [`Self::nearest`] if all others are farther.
+    pub(super) fn nearest_of(
+        &self,
+        triangles: &[u32],
+        point: Vec3,
+        distance: f32,
+    ) -> Option<NearestTriangle> {
+        let mut search = NearestSearch::new(self, point);
+        search.examine(triangles.iter().copied());
+        (search.reach < distance * distance).then_some(search.found).flatten()
     }
 
     /// Returns the leaf to which the nearer child leads at each node.
@@ -128,16 +145,36 @@ impl TriangleTree {
         }
         Some(node)
     }
+}
 
-    /// Replaces a triangle by the nearest one of a leaf, if that is nearer.
-    fn find_nearer(&self, leaf: &Node, point: Vec3, nearest: &mut Option<NearestTriangle>) {
-        let [first, end] = leaf.triangles;
-        for triangle in first..end {
-            let found = self.triangles[triangle as usize].nearest(point);
-            let square = found.apart.dot(found.apart);
-            let limit = nearest.as_ref().map_or(f32::INFINITY, |nearest| nearest.square);
-            if square < limit {
-                *nearest = Some(NearestTriangle { triangle, nearest: found, square });
+/// A search for the triangle that is nearest to a point. The result does not depend on the order in which triangles are
+/// examined, nor on those that are certainly farther.
+struct NearestSearch<'a> {
+    tree: &'a TriangleTree,
+    point: Vec3,
+    found: Option<NearestTriangle>,
+    /// Square of the distance of the found triangle, and more than all rounding.
+    reach: f32,
+}
+
+impl<'a> NearestSearch<'a> {
+    fn new(tree: &'a TriangleTree, point: Vec3) -> Self {
+        Self { tree, point, found: None, reach: f32::INFINITY }
+    }
+
+    fn examine(&mut self, triangles: impl Iterator<Item = u32>) {
+        for triangle in triangles {
+            let one = &self.tree.triangles[triangle as usize];
+            let Some(nearest) = one.nearest_within(self.point, self.reach) else { continue };
+            let square = nearest.apart.dot(nearest.apart);
+            let (limit, before) = self
+                .found
+                .as_ref()
+                .map_or((f32::INFINITY, 0), |found| (found.square, found.triangle));
+            if square < limit || (square == limit && triangle < before) {
+                self.found = Some(NearestTriangle { triangle, nearest, square });
+                let distance = square.sqrt() + self.tree.rounding;
+                self.reach = distance * distance;
             }
         }
     }
@@ -146,6 +183,10 @@ impl TriangleTree {
 impl Node {
     fn is_leaf(&self) -> bool {
         self.triangles[0] < self.triangles[1]
+    }
+
+    fn triangles(&self) -> std::ops::Range<u32> {
+        self.triangles[0]..self.triangles[1]
     }
 
     fn square_to(&self, point: Vec3) -> f32 {

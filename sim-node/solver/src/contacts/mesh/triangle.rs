@@ -116,12 +116,20 @@ impl Triangle {
         self.normal
     }
 
-    /// Finds the point that is nearest to another point.
-    pub(super) fn nearest(&self, point: Vec3) -> NearestPoint {
-        if self.has_beside(point, 0.0) {
-            let height = self.normal.dot(point - self.corners[0]);
-            return NearestPoint { feature: Feature::Face, apart: self.normal * height };
+    /// Finds the point that is nearest to another point, unless a plane shows that the square of their distance exceeds
+    /// `square_max`.
+    pub(super) fn nearest_within(&self, point: Vec3, square_max: f32) -> Option<NearestPoint> {
+        let height = self.normal.dot(point - self.corners[0]);
+        let [a, b, c] = [0, 1, 2].map(|edge| self.inwards[edge].dot(point - self.corners[edge]));
+        let least = lesser(a, lesser(b, c));
+        if least >= 0.0 {
+            return Some(NearestPoint { feature: Feature::Face, apart: self.normal * height });
         }
+        let is_far = height * height + least * least > square_max;
+        (!is_far).then(|| self.nearest_on_border(point))
+    }
+
+    fn nearest_on_border(&self, point: Vec3) -> NearestPoint {
         let [a, b, c] = self.corners;
         let on_edge = |edge: usize, ends: [Vec3; 2]| {
             let share = share_of_nearest(ends, point);
@@ -230,6 +238,10 @@ fn unit(vector: DVec3) -> DVec3 {
 
 fn nearest_on_segment([a, b]: [Vec3; 2], point: Vec3) -> Vec3 {
     a + (b - a) * share_of_nearest([a, b], point)
+}
+
+fn lesser(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
 }
 
 /// The part of the way along a segment at which it is nearest to a point, 0 to 1.

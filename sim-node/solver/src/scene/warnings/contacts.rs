@@ -103,11 +103,10 @@ impl MeshAtLoad {
     /// Returns the normal of the first triangle that a segment passes through, on the side of `from`.
     fn first_normal(&mut self, from: Vec3, to: Vec3) -> Option<Vec3> {
         let path = SubstepPath { start: from, displacement: to - from };
-        let room = self.placed.room(&path);
-        let triangles = self.placed.list(&mut self.near, 0, &room);
+        let around = self.placed.surroundings(&mut self.near, 0, &path);
         // After the last push, only passages count.
-        self.placed.stop(&path, &room, triangles, PUSHES_MAX)?;
-        match self.placed.stop(&path, &room, triangles, 0)? {
+        self.placed.stop(&path, &around, PUSHES_MAX)?;
+        match self.placed.stop(&path, &around, 0)? {
             Stop::Push(hit) => Some(hit.normal),
             Stop::Hold => None,
         }
