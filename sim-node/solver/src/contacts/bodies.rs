@@ -179,7 +179,7 @@ impl Meeting<'_> {
         number: usize,
     ) {
         let (first, _) = self.path();
-        let mut around = mesh.surroundings(lists, number, &first);
+        let mut around = mesh.surroundings(lists, number, &mesh.path(&first));
         if around.are_free() {
             return;
         }
@@ -187,7 +187,8 @@ impl Meeting<'_> {
         for push_count in 0..=PUSHES_MAX {
             let (path, inverse_mass) = self.path();
             let made = if push_count == 0 { path } else { path_to_end(&first, &path) };
-            if !mesh.is_within(&around, &made) {
+            let made = mesh.path(&made);
+            if !around.hold(&made) {
                 around = mesh.surroundings(lists, number, &made);
             }
             let stop = mesh.stop(&made, &around, push_count);

@@ -241,43 +241,54 @@ impl Contacts {
             let (start, displacement) = (path.start.to_array(), path.displacement.to_array());
             let is_near =
                 particles.inverse_mass(index) > 0.0 && obstacle.zone.may_meet(start, displacement);
-            if !is_near {
-                continue;
-            }
-            let before = self.bounce(index);
-            let number = particles.first() + index;
-            let mut around = mesh.surroundings(&mut lists, number, &path);
-            if around.are_free() {
-                continue;
-            }
-            for push_count in 0..=PUSHES_MAX {
-                let path = particles.path(index);
-                if !mesh.is_within(&around, &path) {
-                    around = mesh.surroundings(&mut lists, number, &path);
-                }
-                let stop = mesh.stop(&path, &around, push_count);
-                if stop.is_some() && push_count == 0 {
-                    count(reaction.as_deref_mut());
-                }
-                match stop {
-                    None => break,
-                    Some(Stop::Hold) => {
-                        let surface = &obstacle.surface;
-                        let reaction = reaction.as_deref_mut();
-                        self.hold(particles, (index, &path), (surface, mesh), reaction);
-                        break;
-                    }
-                    Some(Stop::Push(hit)) => {
-                        let (rounding, surface) = (mesh.rounding(), &obstacle.surface);
-                        let bounced = (self.bounce(index) - before).dot(hit.normal);
-                        let contact =
-                            SingleContact { index, path, hit, rounding, surface, bounced };
-                        self.resolve(particles, &contact, reaction.as_deref_mut());
-                    }
-                }
+            if is_near {
+                let mesh = (&obstacle.surface, mesh, &mut lists);
+                self.push_path_off(particles, (index, path), mesh, reaction.as_deref_mut());
             }
         }
         self.near_meshes = lists;
+    }
+
+    /// Pushes a particle off the triangles of a mesh.
+    #[inline(always)]
+    fn push_path_off(
+        &mut self,
+        particles: &mut impl ParticleBlock,
+        (index, mut path): (usize, SubstepPath),
+        (surface, mesh, lists): (&Surface, &PlacedMesh, &mut NearMeshes),
+        mut reaction: Option<&mut Reaction>,
+    ) {
+        let before = self.bounce(index);
+        let number = particles.first() + index;
+        let mut relative = mesh.path(&path);
+        let mut around = mesh.surroundings(lists, number, &relative);
+        if around.are_free() {
+            return;
+        }
+        for push_count in 0..=PUSHES_MAX {
+            let stop = mesh.stop(&relative, &around, push_count);
+            if stop.is_some() && push_count == 0 {
+                count(reaction.as_deref_mut());
+            }
+            match stop {
+                None => break,
+                Some(Stop::Hold) => {
+                    self.hold(particles, (index, &path), (surface, mesh), reaction);
+                    break;
+                }
+                Some(Stop::Push(hit)) => {
+                    let rounding = mesh.rounding();
+                    let bounced = (self.bounce(index) - before).dot(hit.normal);
+                    let contact = SingleContact { index, path, hit, rounding, surface, bounced };
+                    self.resolve(particles, &contact, reaction.as_deref_mut());
+                }
+            }
+            path = particles.path(index);
+            relative = mesh.path(&path);
+            if !around.hold(&relative) {
+                around = mesh.surroundings(lists, number, &relative);
+            }
+        }
     }
 
     /// Moves a particle with the mesh that leaves it no room.

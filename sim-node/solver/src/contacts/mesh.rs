@@ -27,7 +27,8 @@ use super::zone::Zone;
 use collision_mesh::{CollisionMesh, TOLERANCE};
 use inside::SurfacePoint;
 use near::{NearMeshes, NearQuery, NearTriangles};
-use triangle::{Gap, MeshPath, Touch, Triangle};
+pub(crate) use triangle::MeshPath;
+use triangle::{Gap, Touch, Triangle};
 
 /// Least distance that particles keep from a mesh, in tolerances. It exceeds the rounding of a
 /// particle on the surface, so that its side is certain.
@@ -83,14 +84,24 @@ impl PlacedMesh {
         self.gap.tolerance
     }
 
+    /// Returns a path in the moving frame of the mesh.
+    #[inline(always)]
+    pub(crate) fn path(&self, path: &SubstepPath) -> MeshPath {
+        let start = self.before.local(path.start);
+        // Exactly 0 for a mesh at rest.
+        let shift = self.now.local(path.start) - start;
+        let motion = shift + self.now.to_local(path.displacement);
+        let rounding = TOLERANCE * (start.abs().element_sum() + motion.abs().element_sum());
+        MeshPath { start, motion, rounding }
+    }
+
     /// Finds what is around a path of a particle, which its number names, and around it after some pushes.
     pub(crate) fn surroundings<'a>(
         &self,
         lists: &'a mut NearMeshes,
         particle: usize,
-        path: &SubstepPath,
+        path: &MeshPath,
     ) -> Surroundings<'a> {
-        let path = self.path(path);
         let length = path.motion.dot(path.motion).sqrt();
         let bounds = Bounds::around([path.start.to_array(), path.end().to_array()]);
         let rounding = self.gap.tolerance + 2.0 * path.rounding;
@@ -106,11 +117,6 @@ impl PlacedMesh {
         Surroundings { ends, triangles, starts_inside }
     }
 
-    /// True if a path after some pushes ends within the surroundings of the first one.
-    pub(crate) fn is_within(&self, around: &Surroundings<'_>, path: &SubstepPath) -> bool {
-        around.ends.contains(self.path(path).end().to_array())
-    }
-
     /// Returns the depth of a point inside a solid, or `None` if it is outside or the mesh is not solid.
     pub(crate) fn depth(&self, point: Vec3) -> Option<f32> {
         let point = self.now.local(point);
@@ -121,13 +127,12 @@ impl PlacedMesh {
     /// Finds what stops a path after this number of pushes, or `None` if nothing does.
     pub(crate) fn stop(
         &self,
-        path: &SubstepPath,
+        path: &MeshPath,
         around: &Surroundings<'_>,
         push_count: usize,
     ) -> Option<Stop> {
-        let path = self.path(path);
         if around.starts_inside {
-            return self.way_out(&path, push_count).map(Stop::Push);
+            return self.way_out(path, push_count).map(Stop::Push);
         }
         let is_resolved = |touch: &Touch| match push_count {
             0 => true,
@@ -136,7 +141,7 @@ impl PlacedMesh {
         };
         let mut first: Option<Touch> = None;
         self.for_each(around, |triangle| {
-            if let Some(touch) = triangle.touch(&path, self.gap).filter(&is_resolved)
+            if let Some(touch) = triangle.touch(path, self.gap).filter(&is_resolved)
                 && first.is_none_or(|first| touch.is_before(&first))
             {
                 first = Some(touch);
@@ -160,15 +165,6 @@ impl PlacedMesh {
     /// Displacement of a particle that stays where its path starts, in the frame of the mesh.
     pub(crate) fn held_displacement(&self, start: Vec3) -> Vec3 {
         self.now.to_scene(self.before.local(start) - self.now.local(start))
-    }
-
-    fn path(&self, path: &SubstepPath) -> MeshPath {
-        let start = self.before.local(path.start);
-        // Exactly 0 for a mesh at rest.
-        let shift = self.now.local(path.start) - start;
-        let motion = shift + self.now.to_local(path.displacement);
-        let rounding = TOLERANCE * (start.abs().element_sum() + motion.abs().element_sum());
-        MeshPath { start, motion, rounding }
     }
 
     /// The box in which the triangles lie that paths with these ends can touch.
@@ -212,6 +208,11 @@ pub(crate) struct Surroundings<'a> {
 }
 
 impl Surroundings<'_> {
+    /// True if a path after some pushes ends here.
+    pub(crate) fn hold(&self, path: &MeshPath) -> bool {
+        self.ends.contains(path.end().to_array())
+    }
+
     /// True if no contact is possible: no triangle is near, and the paths start outside.
     pub(crate) fn are_free(&self) -> bool {
         self.triangles.are_none() && !self.starts_inside

@@ -19,7 +19,7 @@ const _: () = assert!(size_of::<Triangle>() == 84);
 
 /// The path of a particle in a substep, in the moving frame of a mesh.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct MeshPath {
+pub(crate) struct MeshPath {
     pub(super) start: Vec3,
     pub(super) motion: Vec3,
     /// Bound on the rounding of a point of the path.

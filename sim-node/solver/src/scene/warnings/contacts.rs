@@ -103,6 +103,7 @@ impl MeshAtLoad {
     /// Returns the normal of the first triangle that a segment passes through, on the side of `from`.
     fn first_normal(&mut self, from: Vec3, to: Vec3) -> Option<Vec3> {
         let path = SubstepPath { start: from, displacement: to - from };
+        let path = self.placed.path(&path);
         let around = self.placed.surroundings(&mut self.near, 0, &path);
         // After the last push, only passages count.
         self.placed.stop(&path, &around, PUSHES_MAX)?;
