@@ -95,7 +95,7 @@ impl PlacedMesh {
         MeshPath { start, motion, rounding }
     }
 
-    /// Finds what is around a path of a particle, which its number names, and around it after some pushes.
+    /// Finds the surroundings of a path of a particle, also after some pushes. The number names the particle.
     pub(crate) fn surroundings<'a>(
         &self,
         lists: &'a mut NearMeshes,
@@ -196,7 +196,7 @@ pub(crate) enum Stop {
     Hold,
 }
 
-/// What is around the paths of a particle in a substep.
+/// The surroundings of the paths of a particle in a substep.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Surroundings<'a> {
     /// The box in which a path ends, also after some pushes. So the triangles that the particle can touch are known
