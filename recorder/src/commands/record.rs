@@ -286,8 +286,8 @@ impl Recording {
         let report = Report::new(&written, self.feed.skipped_count(), stop_reason.clone());
         if !report.has_files() && args.black_box.is_none() {
             bail!(
-                "nothing was recorded ({stop_reason}): {endpoint} published no snapshot with a keyframe, as a \
-                 paused node does at its next step"
+                "nothing was recorded ({stop_reason}): {endpoint} published no snapshot with a keyframe. A node that \
+                 a command has changed in a pause does so at its next step: `sim-node ctl step 1`"
             );
         }
         Ok(report)

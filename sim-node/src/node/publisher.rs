@@ -65,6 +65,8 @@ pub(crate) struct Publisher {
     times: StepTimes,
     /// Header of the newest published snapshot.
     last: SnapshotHeader,
+    /// Number of outcomes after which the state is still that of this snapshot.
+    same_state_count: u64,
     /// Number of published snapshots, modulo 2^32.
     snapshot_count: u32,
     /// The next snapshot needs a keyframe.
@@ -117,6 +119,7 @@ impl Publisher {
             every,
             times: StepTimes::default(),
             last: SnapshotHeader::default(),
+            same_state_count: 0,
             snapshot_count: 0,
             is_keyframe_due: true,
             is_second_keyframe_due: false,
@@ -205,7 +208,11 @@ impl Publisher {
         if result == Ok(Applied::InPlace) {
             self.since_step = step;
         }
-        self.is_keyframe_due |= result.is_ok_and(|applied| applied != Applied::Target);
+        let is_same_state = result.is_err() || matches!(result, Ok(Applied::Control(_)));
+        if is_same_state && self.same_state_count + 1 == self.outcome_count {
+            self.same_state_count = self.outcome_count;
+        }
+        self.is_keyframe_due |= matches!(result, Ok(Applied::State | Applied::InPlace));
     }
 
     /// Logs a release that no client asked for, at the boundary before `step`.
@@ -258,6 +265,7 @@ impl Publisher {
         }
         self.publish_outcomes()?;
         self.last = self.header(solver, position);
+        self.same_state_count = self.outcome_count;
         let particles: &[ParticleState] = cast_slice(solver.particles());
         self.owner.publish_particles(&self.last, |index| particles[index])?;
         self.snapshot_count = self.snapshot_count.wrapping_add(1);
@@ -344,7 +352,7 @@ impl Publisher {
     ) -> anyhow::Result<()> {
         self.watch_keyframe_readers();
         let is_untouched =
-            self.last.step == position.step && self.last.outcome_count == self.outcome_count;
+            self.last.step == position.step && self.same_state_count == self.outcome_count;
         if is_untouched && self.keyframe_step == position.step {
             // A reader that joins now receives it, because it is latched.
             (self.is_keyframe_due, self.is_second_keyframe_due) = (false, false);
@@ -393,6 +401,7 @@ impl Publisher {
             run_id: self.run_id,
             step: position.step,
             size_bytes: bytes.len() as u64,
+            outcome_count: self.outcome_count,
         };
         self.owner.publish_keyframe(header, &bytes)?;
         self.is_keyframe_due = false;

@@ -176,6 +176,27 @@ fn a_recording_that_starts_while_the_node_is_paused_verifies() {
 }
 
 #[test]
+fn a_recording_begins_at_the_state_at_which_a_node_has_paused_and_loses_nothing() {
+    let sandbox = Sandbox::new();
+    let file = sandbox.path("paused.mcap");
+    let _node = node(&sandbox, &["run", "curtain"]);
+    ctl(&sandbox, &["pause"]);
+    // None of them changes the state.
+    ctl(&sandbox, &["mark", "begin"]);
+    assert_eq!(ctl(&sandbox, &["pin", "9999"])["status"], "rejected");
+    ctl(&sandbox, &["set", "time_scale", "2"]);
+    let paused = ctl(&sandbox, &["status"])["step"].as_u64().unwrap();
+    let recording = record(&sandbox, &file);
+    ctl(&sandbox, &["pin", "90"]);
+    ctl(&sandbox, &["step", "20"]);
+    recording.interrupt().success();
+    let steps: Vec<_> = frames(&file).iter().map(|frame| frame.row.step).collect();
+    assert_eq!(steps, (paused..=paused + 20).collect::<Vec<_>>());
+    assert_eq!(assert_verifies(&sandbox, &file), 20);
+    recorder(&sandbox, &["check", &file]).success();
+}
+
+#[test]
 fn a_reset_in_a_recording_verifies() {
     let sandbox = Sandbox::new();
     let file = sandbox.path("reset.mcap");

@@ -353,8 +353,8 @@ fn an_invalid_command_is_refused_and_does_not_reach_the_source() {
     }
     let (mut client, _) = Client::start(&site.url);
     client.advertise(1, "/other");
-    assert!(client.text("status")["message"].as_str().unwrap().contains("/commands"));
     client.publish(1, &json!({ "kind": "pause" }));
+    assert!(client.text("status")["message"].as_str().unwrap().contains("/commands"));
     client.advertise(2, "/commands");
     client.publish(2, &json!({ "kind": "resume" }));
     let command = wait_for("a command", || match site.requests.next(Duration::ZERO)?.kind {

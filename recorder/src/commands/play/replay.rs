@@ -210,7 +210,7 @@ impl Replay {
 
     fn publish_keyframe(&mut self, step: u64, bytes: &[u8]) -> anyhow::Result<()> {
         let size_bytes = bytes.len() as u64;
-        let header = KeyframeHeader { run_id: self.run_id, step, size_bytes };
+        let header = KeyframeHeader { run_id: self.run_id, step, size_bytes, outcome_count: 0 };
         self.owner.publish_keyframe(header, bytes)?;
         self.is_keyframe_wanted = false;
         Ok(())

@@ -31,14 +31,18 @@ impl FirstState {
         if parameters.header.step <= header.step {
             changes.push(Change::Parameters(parameters.header, parameters.values.clone()));
         }
-        changes
-            .extend(state.changes.iter().filter(|change| is_keyframe_of(change, header)).cloned());
-        Some(Self {
+        let mut first = Self {
             header: *header,
             particles: state.particles.to_vec(),
             torn_before: before.iter().map(|torn| torn.constraint).collect(),
             changes,
-        })
+        };
+        for change in state.changes {
+            if let Change::Keyframe(keyframe, bytes) = change {
+                first.add_keyframe(keyframe, bytes);
+            }
+        }
+        Some(first)
     }
 
     /// Returns `true` if a state has arrived with all its parts and its keyframe.
@@ -52,11 +56,13 @@ impl FirstState {
         self.changes.iter().any(|change| is_keyframe_of(change, &self.header))
     }
 
-    /// Adds the keyframe of this state. Ignores those of other states.
+    /// Adds the keyframe of this state, and counts the outcomes since that have not changed it: they are not published
+    /// again. Ignores keyframes of other states.
     pub(crate) fn add_keyframe(&mut self, keyframe: &KeyframeHeader, bytes: &[u8]) {
         let change = Change::Keyframe(*keyframe, bytes.to_vec());
         if is_keyframe_of(&change, &self.header) && !self.has_keyframe() {
             self.changes.push(change);
+            self.header.outcome_count = self.header.outcome_count.max(keyframe.outcome_count);
         }
     }
 }

@@ -93,7 +93,7 @@ pub struct LoadHeader {
 
 const _: () = assert!(size_of::<LoadHeader>() == 72 && align_of::<LoadHeader>() == 8);
 
-/// Header of `keyframe`: 24 bytes, alignment 8.
+/// Header of `keyframe`: 32 bytes, alignment 8.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable, ZeroCopySend)]
 #[repr(C)]
 #[type_name("catenary.KeyframeHeader")]
@@ -104,6 +104,9 @@ pub struct KeyframeHeader {
     pub step: u64,
     /// Length of the payload in bytes.
     pub size_bytes: u64,
+    /// Number of outcomes of the run up to this state. Those after the snapshot's, such as that of a pause, have not
+    /// changed it. 0 in a replay, where the snapshot counts all.
+    pub outcome_count: u64,
 }
 
-const _: () = assert!(size_of::<KeyframeHeader>() == 24 && align_of::<KeyframeHeader>() == 8);
+const _: () = assert!(size_of::<KeyframeHeader>() == 32 && align_of::<KeyframeHeader>() == 8);

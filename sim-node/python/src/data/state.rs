@@ -100,7 +100,12 @@ pub(crate) fn current_state(py: Python<'_>, endpoint: &Endpoint) -> PyResult<Sta
         tap.wait(part);
         Ok(None)
     })?;
-    state.ok_or_else(|| Timeout::new_err(format!("{endpoint} has published no complete state")))
+    state.ok_or_else(|| {
+        Timeout::new_err(format!(
+            "{endpoint} has published no complete state: a node that a command has changed in a pause publishes one at its \
+             next step, such as with node.step(1)"
+        ))
+    })
 }
 
 /// Returns the state, if it has a keyframe of its own.

@@ -73,7 +73,7 @@ impl Publisher {
     pub(crate) fn begin_run(&mut self, run_id: u64, rate_hz: u32) {
         (self.run_id, self.rate_hz) = (run_id, rate_hz);
         (self.last, self.snapshot_count, self.keyframe_step) = (SnapshotHeader::default(), 0, 0);
-        (self.outcome_count, self.rejected_count) = (0, 0);
+        (self.outcome_count, self.same_state_count, self.rejected_count) = (0, 0, 0);
         (self.since_step, self.included_step) = (0, 0);
         self.is_keyframe_due = true;
     }

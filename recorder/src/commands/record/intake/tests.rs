@@ -114,7 +114,7 @@ fn header(step: u64, outcome_count: u64) -> SnapshotHeader {
 }
 
 fn keyframe_header(step: u64) -> KeyframeHeader {
-    KeyframeHeader { run_id: RUN_ID, step, size_bytes: 1 }
+    KeyframeHeader { run_id: RUN_ID, step, size_bytes: 1, outcome_count: 0 }
 }
 
 fn keyframe(step: u64) -> Change {
