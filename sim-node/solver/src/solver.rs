@@ -117,7 +117,7 @@ impl Solver {
             tethers: Tethers::default(),
             colliders: (0..)
                 .zip(&scene.colliders)
-                .map(|(at, one)| Collider::new(at, one))
+                .map(|(at, one)| Collider::new(at, one).for_steps())
                 .collect(),
             obstacles: Vec::with_capacity(OBSTACLES_PER_COLLIDER * scene.colliders.len()),
             contact_mode: scene.contact.mode,

@@ -188,7 +188,7 @@ impl Meeting<'_> {
             let (path, inverse_mass) = self.path();
             let made = if push_count == 0 { path } else { path_to_end(&first, &path) };
             let made = mesh.path(&made);
-            if !around.hold(&made) {
+            if !around.contain_end(&made) {
                 around = mesh.surroundings(lists, number, &made);
             }
             let stop = mesh.stop(&made, &around, push_count);

@@ -118,6 +118,6 @@ impl Bounds {
 
 /// The lesser number; `b` if `a` is NaN.
 #[inline(always)]
-fn lesser(a: f32, b: f32) -> f32 {
+pub(super) fn lesser(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }

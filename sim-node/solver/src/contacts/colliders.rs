@@ -72,6 +72,14 @@ impl Collider {
         }
     }
 
+    /// Prepares a solid mesh for many steps.
+    pub(crate) fn for_steps(mut self) -> Self {
+        if let Some(mesh) = self.mesh.as_mut().and_then(Arc::get_mut) {
+            mesh.find_cells();
+        }
+        self
+    }
+
     /// True if a client may set this frame: bounds do not rotate.
     pub(crate) fn accepts(&self, frame: &Frame) -> bool {
         frame.rotation == Quat::IDENTITY || !matches!(self.at_load, PlacedShape::Bounds { .. })

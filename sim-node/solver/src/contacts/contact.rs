@@ -285,7 +285,7 @@ impl Contacts {
             }
             path = particles.path(index);
             relative = mesh.path(&path);
-            if !around.hold(&relative) {
+            if !around.contain_end(&relative) {
                 around = mesh.surroundings(lists, number, &relative);
             }
         }

@@ -209,7 +209,7 @@ pub(crate) struct Surroundings<'a> {
 
 impl Surroundings<'_> {
     /// True if a path after some pushes ends here.
-    pub(crate) fn hold(&self, path: &MeshPath) -> bool {
+    pub(crate) fn contain_end(&self, path: &MeshPath) -> bool {
         self.ends.contains(path.end().to_array())
     }
 

@@ -6,7 +6,7 @@ use crate::contacts::bounds::Bounds;
 
 /// Number of cells along the longest side of the solid. A power of two.
 const SIDE: usize = 64;
-/// Distance of a corner from the center of a cube, relative to its side: sqrt(3/4), and more than rounding.
+/// Distance of a corner from the center of a cube, relative to its side: sqrt(3/4), and more than its rounding.
 const CORNER: f32 = 0.87;
 
 /// Where the points of a cell are.
@@ -25,6 +25,8 @@ pub(super) struct Cells {
     origin: Vec3,
     /// Cells per unit.
     scale: f32,
+    /// Bound on the rounding of a height.
+    rounding: f32,
     /// By x, then y, then z.
     places: Vec<Place>,
 }
@@ -39,12 +41,17 @@ struct Block {
 }
 
 impl Cells {
-    /// `height` returns the distance of a point from the surface, negative inside, or `None` if it is unknown.
-    pub(super) fn new(bounds: &Bounds, height: &impl Fn(Vec3) -> Option<f32>) -> Self {
+    /// `height` returns the distance of a point from the surface, negative inside, or `None` if it is unknown. It rounds by
+    /// at most `rounding`.
+    pub(super) fn new(
+        bounds: &Bounds,
+        height: &impl Fn(Vec3) -> Option<f32>,
+        rounding: f32,
+    ) -> Self {
         let origin = Vec3::from_array(bounds.min);
         let longest = (Vec3::from_array(bounds.max) - origin).max_element();
         let places = vec![Place::NearSurface; SIDE * SIDE * SIDE];
-        let mut cells = Self { origin, scale: SIDE as f32 / longest, places };
+        let mut cells = Self { origin, scale: SIDE as f32 / longest, rounding, places };
         cells.fill(Block { first: [0; 3], side: SIDE }, height);
         cells
     }
@@ -61,7 +68,7 @@ impl Cells {
     fn fill(&mut self, block: Block, height: &impl Fn(Vec3) -> Option<f32>) {
         let half = 0.5 * block.side as f32;
         let center = Vec3::from_array(block.first.map(|first| first as f32 + half));
-        let reach = CORNER * block.side as f32 / self.scale;
+        let reach = CORNER * block.side as f32 / self.scale + self.rounding;
         let found = match height(self.origin + center / self.scale) {
             Some(height) if height > reach => Place::Outside,
             Some(height) if height < -reach => Place::Inside,
@@ -106,7 +113,7 @@ mod tests {
         let bounds = Bounds { min: [1.0, -0.5, -0.5], max: [3.0, 0.5, 0.5] };
         // A ball at one end of the box.
         let height = |point: Vec3| point.distance(Vec3::new(1.5, 0.0, 0.0)) - 0.5;
-        let cells = Cells::new(&bounds, &|point| Some(height(point)));
+        let cells = Cells::new(&bounds, &|point| Some(height(point)), 1e-6);
         let mut counts = [0; 3];
         for index in 0..40 * 40 * 40 {
             let share = [index % 40, index / 40 % 40, index / 1600].map(|part| part as f32 / 39.0);
@@ -125,7 +132,7 @@ mod tests {
     #[test]
     fn a_point_of_unknown_height_is_near_the_surface() {
         let bounds = Bounds { min: [0.0; 3], max: [1.0; 3] };
-        let cells = Cells::new(&bounds, &|_| None);
+        let cells = Cells::new(&bounds, &|_| None, 1e-6);
         assert_eq!(cells.at(Vec3::splat(0.5)), Place::NearSurface);
     }
 }

@@ -33,8 +33,15 @@ impl CollisionMesh {
         let corners = mesh.triangles.iter().map(|one| corners(&mesh.vertices, *one));
         let triangles = corners.filter_map(|one| Triangle::new(one, height_min)).collect();
         let (tree, order) = TriangleTree::new(triangles);
-        let inside = mesh.is_solid.then(|| Inside::new(mesh, &tree, &order));
+        let inside = mesh.is_solid.then(|| Inside::new(mesh, &order));
         Self { tree, inside, collider, extents: extents(&mesh.vertices) }
+    }
+
+    /// Prepares a solid for many steps.
+    pub(crate) fn find_cells(&mut self) {
+        if let Some(inside) = &mut self.inside {
+            inside.find_cells(&self.tree);
+        }
     }
 
     /// Returns the point of the surface of a solid that is nearest to a point. `tolerance` bounds the rounding of the

@@ -146,7 +146,8 @@ impl Sides {
 #[derive(Debug)]
 pub(super) struct Inside {
     outwards: Outwards,
-    cells: Cells,
+    /// None until [`Inside::find_cells`].
+    cells: Option<Cells>,
 }
 
 /// Tells the side of points by the normal of the nearest part of the surface (Signed Distance Computation Using the Angle
@@ -178,11 +179,14 @@ pub(super) struct SurfacePoint {
 
 impl Inside {
     /// `mesh` has no flaw ([`find_flaw`]). `order` has, by triangle of the tree, the triangle of the mesh.
-    pub(super) fn new(mesh: &ColliderMesh, tree: &TriangleTree, order: &[u32]) -> Self {
-        let outwards = Outwards::new(mesh, order);
-        let height = |point| Some(outwards.surface_point(tree, &tree.nearest(point)?, 0.0).height);
-        let cells = Cells::new(&tree.bounds(), &height);
-        Self { outwards, cells }
+    pub(super) fn new(mesh: &ColliderMesh, order: &[u32]) -> Self {
+        Self { outwards: Outwards::new(mesh, order), cells: None }
+    }
+
+    /// Finds the cells that are far from the surface. That pays off for the points of many steps.
+    pub(super) fn find_cells(&mut self, tree: &TriangleTree) {
+        let height = |point| Some(self.surface_near(tree, point, 0.0)?.height);
+        self.cells = Some(Cells::new(&tree.bounds(), &height, tree.rounding));
     }
 
     /// Returns the point of the surface that is nearest to a point, whose rounding is at most `tolerance`. `None` for
@@ -208,7 +212,7 @@ impl Inside {
         if !tree.bounds().contains(point.to_array()) {
             return false;
         }
-        match self.cells.at(point) {
+        match self.cells.as_ref().map_or(Place::NearSurface, |cells| cells.at(point)) {
             Place::Inside => true,
             Place::Outside => false,
             Place::NearSurface => {
@@ -364,7 +368,8 @@ mod tests {
         let corners = |one: &[u32; 3]| one.map(|vertex| mesh.vertices[vertex as usize]);
         let triangles = mesh.triangles.iter().map(|one| Triangle::new(corners(one), 0.0).unwrap());
         let (tree, order) = TriangleTree::new(triangles.collect());
-        let inside = Inside::new(mesh, &tree, &order);
+        let mut inside = Inside::new(mesh, &order);
+        inside.find_cells(&tree);
         (tree, inside)
     }
 

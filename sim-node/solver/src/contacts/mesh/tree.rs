@@ -19,7 +19,7 @@ pub(super) struct TriangleTree {
     /// Each node before its children.
     nodes: Vec<Node>,
     /// Bound on the rounding of two distances of points in the box of the tree.
-    rounding: f32,
+    pub(super) rounding: f32,
 }
 
 #[derive(Debug)]
@@ -120,8 +120,8 @@ impl TriangleTree {
         search.found
     }
 
-    /// Returns the one of some triangles that is nearest to a point, if it is certainly nearer than `distance`. It is
-    /// that of [`Self::nearest`] if all others are farther.
+    /// Returns the nearest of some triangles, if it is certainly nearer than `distance`. If all others are farther, this is
+    /// the triangle that [`Self::nearest`] returns.
     pub(super) fn nearest_of(
         &self,
         triangles: &[u32],
@@ -165,7 +165,10 @@ impl<'a> NearestSearch<'a> {
     fn examine(&mut self, triangles: impl Iterator<Item = u32>) {
         for triangle in triangles {
             let one = &self.tree.triangles[triangle as usize];
-            let Some(nearest) = one.nearest_within(self.point, self.reach) else { continue };
+            let Some(nearest) = one.nearest_within(self.point, self.reach, self.tree.rounding)
+            else {
+                continue;
+            };
             let square = nearest.apart.dot(nearest.apart);
             let (limit, before) = self
                 .found
@@ -212,4 +215,51 @@ fn longest_axis(bounds: &Bounds) -> usize {
     let length = |axis: usize| bounds.max[axis] - bounds.min[axis];
     let longer = |a, b| if length(b) > length(a) { b } else { a };
     longer(longer(0, 1), 2)
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+
+    /// Distance of a point from a triangle in f64.
+    fn distance(corners: [DVec3; 3], point: DVec3) -> f64 {
+        let edges = [0, 1, 2].map(|at| [corners[at], corners[(at + 1) % 3]]);
+        let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize();
+        let is_inside = |[a, b]: &[DVec3; 2]| normal.cross(*b - *a).dot(point - *a) >= 0.0;
+        if edges.iter().all(is_inside) {
+            return normal.dot(point - corners[0]).abs();
+        }
+        let to_edge = |[a, b]: [DVec3; 2]| {
+            let share = (b - a).dot(point - a) / (b - a).dot(b - a);
+            point.distance(a + (b - a) * share.clamp(0.0, 1.0))
+        };
+        edges.map(to_edge).into_iter().fold(f64::INFINITY, f64::min)
+    }
+
+    #[test]
+    fn distances_from_needles_are_exact_up_to_the_bound_that_decides_what_is_nearest() {
+        let mut state = 1_u32;
+        let mut random = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            2.0 * (state >> 8) as f32 / (1 << 24) as f32 - 1.0
+        };
+        let mut vector = || Vec3::new(random(), random(), random());
+        for round in 0..200_000 {
+            let (tip, along) = (vector() * 0.3, vector().normalize() * 0.5);
+            // Tips of 1e-1 to 1e-5 rad, and points near them.
+            let width = 0.1_f32.powi(1 + round % 5);
+            let corners = [tip, tip + along, tip + along + vector() * width];
+            let corners = corners.map(|corner| corner.to_array());
+            let Some(needle) = Triangle::new(corners, 1e-6) else { continue };
+            let (tree, _) = TriangleTree::new(vec![needle]);
+            let point = tip - along * (1e-4 * width.sqrt()) + vector() * 1e-6;
+            let found = tree.nearest(point).unwrap();
+            let corners = corners.map(|corner| Vec3::from_array(corner).as_dvec3());
+            let error = f64::from(found.square.sqrt()) - distance(corners, point.as_dvec3());
+            assert!(error.abs() < 0.5 * f64::from(tree.rounding), "{corners:?} {point}: {error}");
+        }
+    }
 }

@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::contacts::bounds::Bounds;
+use crate::contacts::bounds::{Bounds, lesser};
 
 /// A triangle, in the frame of its mesh.
 #[derive(Debug, Clone)]
@@ -117,15 +117,22 @@ impl Triangle {
     }
 
     /// Finds the point that is nearest to another point, unless a plane shows that the square of their distance exceeds
-    /// `square_max`.
-    pub(super) fn nearest_within(&self, point: Vec3, square_max: f32) -> Option<NearestPoint> {
+    /// `square_max`. The foot of a point on the plane counts as inside only by more than `rounding`: beyond the tip of
+    /// a needle it may seem to be inside.
+    pub(super) fn nearest_within(
+        &self,
+        point: Vec3,
+        square_max: f32,
+        rounding: f32,
+    ) -> Option<NearestPoint> {
         let height = self.normal.dot(point - self.corners[0]);
         let [a, b, c] = [0, 1, 2].map(|edge| self.inwards[edge].dot(point - self.corners[edge]));
         let least = lesser(a, lesser(b, c));
-        if least >= 0.0 {
+        if least > rounding {
             return Some(NearestPoint { feature: Feature::Face, apart: self.normal * height });
         }
-        let is_far = height * height + least * least > square_max;
+        let outside = lesser(least, 0.0);
+        let is_far = height * height + outside * outside > square_max;
         (!is_far).then(|| self.nearest_on_border(point))
     }
 
@@ -238,10 +245,6 @@ fn unit(vector: DVec3) -> DVec3 {
 
 fn nearest_on_segment([a, b]: [Vec3; 2], point: Vec3) -> Vec3 {
     a + (b - a) * share_of_nearest([a, b], point)
-}
-
-fn lesser(a: f32, b: f32) -> f32 {
-    if a < b { a } else { b }
 }
 
 /// The part of the way along a segment at which it is nearest to a point, 0 to 1.
