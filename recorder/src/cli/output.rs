@@ -64,6 +64,16 @@ pub(crate) fn warn_incomplete(path: &Path, end: &LogEnd, done: &str) {
     }
 }
 
+/// Describes what is left of a recording after an error of writing.
+pub(crate) fn incomplete(recording: &str, part_path: &Path) -> String {
+    let is_empty = std::fs::metadata(part_path).is_ok_and(|part| part.len() == 0);
+    if is_empty {
+        format!("{recording} is incomplete; nothing of it was written")
+    } else {
+        format!("{recording} is incomplete; its readable part is {}", path_text(part_path))
+    }
+}
+
 /// Returns a path as text for users.
 pub(crate) fn path_text(path: &Path) -> String {
     path.display().to_string()

@@ -169,12 +169,18 @@ fn export<R: Read>(
 ) -> anyhow::Result<()> {
     let visit = |visitor: &mut dyn FnMut(&SceneState) -> anyhow::Result<ControlFlow<()>>| {
         let bar = progress_bar(steps.len() as u64);
+        // An error of the output is none of the recording.
+        let mut refused = None;
         let visited = visit_states(open()?, steps, |state| {
             bar.inc(1);
-            visitor(state)
+            visitor(state).or_else(|error| {
+                refused = Some(error);
+                Ok(ControlFlow::Break(()))
+            })
         });
         bar.finish_and_clear();
-        visited.with_context(|| output::path_text(&args.file))
+        visited.with_context(|| output::path_text(&args.file))?;
+        refused.map_or(Ok(()), Err)
     };
     let open_bytes = || {
         let file = open_regular_file(&args.file)?.take(survey.intact_count);

@@ -15,7 +15,7 @@ use recorder::{
 };
 use serde::Serialize;
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
-use sim_contract::{Action, Outcome, Reason, Stop, printable_line};
+use sim_contract::{Action, Outcome, Reason, Stop, part_path, printable_line};
 use sim_solver::{Scene, Solver};
 
 use crate::cli::exit::{Exit, with_usage};
@@ -249,8 +249,8 @@ fn in_output(args: &SimulateArgs, error: anyhow::Error) -> anyhow::Error {
 
 /// Describes the file after a write error.
 fn truncation(args: &SimulateArgs) -> String {
-    let path = args.output.as_deref().map(output::path_text).unwrap_or_default();
-    format!("{path} is incomplete; its readable part is {path}.part")
+    let path = args.output.as_deref().unwrap_or(Path::new(""));
+    output::incomplete(&output::path_text(path), &part_path(path))
 }
 
 fn begin(args: &SimulateArgs, path: &Path, job: &Job, solver: &Solver) -> anyhow::Result<LogFile> {

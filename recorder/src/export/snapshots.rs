@@ -23,7 +23,7 @@ pub(crate) struct Snapshots<'a> {
     pub(crate) up: Up,
     /// The scene has two dimensions.
     pub(crate) is_2d: bool,
-    /// First step of the recording, at which times begin.
+    /// First step of the recording.
     pub(crate) first_step: u64,
     /// Steps of the selected snapshots, ascending. Not empty.
     pub(crate) steps: &'a [u64],
@@ -35,6 +35,11 @@ pub(crate) struct Snapshots<'a> {
 }
 
 impl Snapshots<'_> {
+    /// Returns the simulated time of the run, which begins at step 0.
+    pub(crate) fn run_time_s(&self, step: u64) -> f64 {
+        step as f64 / f64::from(self.run.rate_hz)
+    }
+
     /// Returns the simulated time since the first snapshot of the recording.
     pub(crate) fn time_s(&self, step: u64) -> f64 {
         step.saturating_sub(self.first_step) as f64 / f64::from(self.run.rate_hz)

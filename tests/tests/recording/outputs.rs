@@ -79,6 +79,30 @@ fn a_recorder_that_waits_for_a_node_refuses_an_unusable_output_first() {
     assert_eq!(std::fs::read_to_string(&part).unwrap(), "of a killed recorder", "it may be needed");
 }
 
+#[test]
+fn a_limit_on_the_size_of_files_ends_an_export_with_the_name_of_the_output() {
+    let sandbox = Sandbox::new();
+    let file = sandbox.path("run.mcap");
+    recorder(&sandbox, &["simulate", "curtain", "--steps", "200", "-o", &file]).success();
+    for format in ["npz", "csv", "usda", "foxglove", "apng", "pc2", "obj", "ros2"] {
+        let (option, output) = (format!("--{format}"), sandbox.path(&format!("{format}.mcap")));
+        let args = ["export", &file, &option, &output];
+        // 4 KiB, in blocks of half of that or less.
+        let export = Process::start_limited(("-f", 4), Program::Recorder, &sandbox, &args);
+        let finished = export.wait();
+        assert_eq!(finished.code, Some(1), "{finished:?}");
+        let error = finished.stderr.lines().last().unwrap_or_default();
+        let expected = format!("error: cannot write {output}");
+        assert!(error.starts_with(&expected), "no \"{expected}\" in: {}", finished.stderr);
+        assert!(error.contains("File too large"), "{error}");
+        assert!(!Path::new(&output).is_file() && !Path::new(&format!("{output}.part")).exists());
+    }
+    let simulate = ["simulate", "curtain", "--steps", "9", "-o", &sandbox.path("empty.mcap")];
+    let simulation = Process::start_limited(("-f", 0), Program::Recorder, &sandbox, &simulate);
+    let finished = simulation.wait();
+    assert!(finished.stderr.contains("; nothing of it was written: "), "{finished:?}");
+}
+
 /// Asserts that a program failed at the limit, and left the readable part of its recording.
 fn assert_ended_at_the_limit(finished: &Finished, file: &str) {
     assert_eq!(finished.code, Some(1), "{}", finished.stderr);

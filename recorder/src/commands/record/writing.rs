@@ -288,7 +288,7 @@ fn free_bytes(path: &Path) -> Option<u64> {
 }
 
 fn incomplete(part_path: &Path) -> String {
-    format!("the recording is incomplete; its readable part is {}", output::path_text(part_path))
+    output::incomplete("the recording", part_path)
 }
 
 /// Writes the messages of an item.

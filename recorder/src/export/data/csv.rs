@@ -12,7 +12,7 @@ const COLUMNS: &str = "step,time_s,particle,x,y,z,vx,vy,vz,inverse_mass,flags";
 pub(crate) fn write(snapshots: &Snapshots<'_>, out: &mut dyn Write) -> anyhow::Result<()> {
     writeln!(out, "{COLUMNS}")?;
     snapshots.for_each(|state| {
-        let (step, time_s) = (state.row.step, snapshots.time_s(state.row.step));
+        let (step, time_s) = (state.row.step, snapshots.run_time_s(state.row.step));
         for (index, particle) in state.particles.iter().enumerate() {
             let ParticleState { position: [x, y, z], velocity: [vx, vy, vz], .. } = particle;
             let ParticleState { inverse_mass, flags, .. } = particle;

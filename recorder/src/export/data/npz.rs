@@ -61,7 +61,7 @@ pub(crate) fn write(snapshots: &Snapshots<'_>, out: &mut dyn Write) -> anyhow::R
     }
     archive.begin("times", "<f8", &[snapshots.steps.len()])?;
     for step in steps {
-        archive.0.write_all(&snapshots.time_s(*step).to_le_bytes())?;
+        archive.0.write_all(&snapshots.run_time_s(*step).to_le_bytes())?;
     }
     for column in COLUMNS {
         archive.add_column(snapshots, &column)?;

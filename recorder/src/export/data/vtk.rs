@@ -23,7 +23,7 @@ pub(crate) fn write(
     names.remove_older(files.existing())?;
     snapshots.for_each(|state| {
         let step = state.row.step;
-        files.add_whole(&names.path(step), &polydata(state, snapshots.time_s(step)))
+        files.add_whole(&names.path(step), &polydata(state, snapshots.run_time_s(step)))
     })?;
     files.add_whole(&collection, pvd(snapshots, &names).as_bytes())
 }
@@ -31,7 +31,7 @@ pub(crate) fn write(
 /// Returns the collection of all files. Names of files have no character that XML reserves.
 fn pvd(snapshots: &Snapshots<'_>, names: &FrameNames<'_>) -> String {
     let entries = snapshots.steps.iter().map(|step| {
-        let (time_s, name) = (snapshots.time_s(*step), names.name(*step));
+        let (time_s, name) = (snapshots.run_time_s(*step), names.name(*step));
         format!("<DataSet timestep=\"{time_s:?}\" file=\"{name}\"/>\n")
     });
     format!(

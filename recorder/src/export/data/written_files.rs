@@ -1,10 +1,41 @@
 //! The files of an export, which all get their names or are all removed.
 
 use std::fs;
-use std::io::Write;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+use anyhow::anyhow;
 use recorder::{Existing, PartFile};
+use sim_contract::explain_write_error;
+
+/// A file that keeps the first error of writing, which a format may wrap or take for one of its input.
+struct ObservedFile<'a> {
+    file: &'a mut PartFile,
+    failure: Option<String>,
+}
+
+impl ObservedFile<'_> {
+    fn observe<T>(&mut self, result: io::Result<T>) -> io::Result<T> {
+        if let Err(error) = &result
+            && error.kind() != io::ErrorKind::Interrupted
+        {
+            self.failure.get_or_insert_with(|| explain_write_error(error));
+        }
+        result
+    }
+}
+
+impl Write for ObservedFile<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let result = self.file.write(bytes);
+        self.observe(result)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        let result = self.file.flush();
+        self.observe(result)
+    }
+}
 
 /// The files that an export has written so far.
 #[derive(Debug)]
@@ -40,9 +71,14 @@ impl WrittenFiles {
         write: impl FnOnce(&mut dyn Write) -> anyhow::Result<()>,
     ) -> anyhow::Result<()> {
         let mut file = PartFile::create(path, self.existing)?;
-        if let Err(error) = write(&mut file) {
+        let mut observed = ObservedFile { file: &mut file, failure: None };
+        if let Err(error) = write(&mut observed) {
+            let failure = observed.failure.map(|text| {
+                let part_path = file.part_path().display();
+                anyhow!("cannot write {part_path}: {text}")
+            });
             file.discard()?;
-            return Err(error);
+            return Err(failure.unwrap_or(error));
         }
         self.paths.push(file.finish()?);
         Ok(())
