@@ -279,10 +279,13 @@ mod tests {
 
     #[test]
     fn a_grab_takes_negative_coordinates_and_a_time_of_at_most_a_quarter_second() {
-        assert!(try_parse("sim-node ctl grab 3 -1 -2e-3 -.5 --over 0.25".split(' ')).is_ok());
-        for over in ["-1", "0.3", "nan", "soon"] {
+        for over in ["0.25", "250ms", "0.1s", "0"] {
+            let line = format!("sim-node ctl grab 3 -1 -2e-3 -.5 --over {over}");
+            assert!(try_parse(line.split(' ')).is_ok(), "{over}");
+        }
+        for over in ["-1", "0.3", "251ms", "nan", "soon"] {
             let text = refused(&format!("sim-node ctl grab 3 -1 -2 0 --over {over}"));
-            assert!(text.contains("a number from 0 to 0.25"), "{text}");
+            assert!(text.contains("a number of seconds from 0 to 0.25"), "{text}");
         }
     }
 }

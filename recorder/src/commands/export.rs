@@ -169,7 +169,7 @@ fn export<R: Read>(
 ) -> anyhow::Result<()> {
     let visit = |visitor: &mut dyn FnMut(&SceneState) -> anyhow::Result<ControlFlow<()>>| {
         let bar = progress_bar(steps.len() as u64);
-        // An error of the output is none of the recording.
+        // Only errors of reading get the name of the recording.
         let mut refused = None;
         let visited = visit_states(open()?, steps, |state| {
             bar.inc(1);
@@ -287,7 +287,11 @@ fn size(text: &str) -> Result<Size, String> {
 }
 
 fn period(text: &str) -> Result<Duration, String> {
-    match parse::duration(text)? {
+    let is_count = text.parse::<u64>().is_ok();
+    let time = parse::duration(text).map_err(|error| {
+        if is_count { format!("{error} (--frames N exports N snapshots)") } else { error }
+    });
+    match time? {
         Duration::ZERO => Err("it must be a time longer than 0s".to_owned()),
         period => Ok(period),
     }

@@ -64,6 +64,10 @@ fn settings_without_effect_cause_a_warning() {
     );
     assert_warns(&format!("up = \"-y\"\n{PAIR}"), "up is \"-y\", but gravity points up, too");
     assert_warns(
+        &format!("unit = \"cm\"\n{PAIR}"),
+        "gravity is 9.81 cm/s², but on Earth it is 981 cm/s²",
+    );
+    assert_warns(
         &format!("[solver]\norder = \"listed\"\n{PAIR}"),
         "order = \"listed\" with one iteration gains energy",
     );

@@ -8,7 +8,7 @@ use sim_contract::{ConstraintKind, GRAB_OVER_S_DEFAULT, ParameterValue};
 use sim_solver::GRAB_OVER_S_MAX;
 
 use super::parameter::{parameter_name, parameters_help};
-use super::value::{index, number, number_in, time, whole};
+use super::value::{index, number, seconds_up_to, time, whole};
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum CommandVerb {
@@ -168,9 +168,10 @@ pub(crate) struct TargetArgs {
     pub(crate) particle: u32,
     #[command(flatten)]
     pub(crate) target: PointArgs,
-    /// Time to the target in seconds, 0 to 0.25, rounded up to whole steps [default: 1/60]
-    #[arg(long, value_name = "SECONDS", default_value_t = GRAB_OVER_S_DEFAULT,
-        hide_default_value = true, value_parser = number_in(0.0..=GRAB_OVER_S_MAX))]
+    /// Time to the target in seconds, such as 0.1, or with its unit, such as 100ms: at most 0.25 s, rounded up to whole
+    /// steps [default: 1/60 s]
+    #[arg(long, value_name = "TIME", default_value_t = GRAB_OVER_S_DEFAULT,
+        hide_default_value = true, value_parser = seconds_up_to(GRAB_OVER_S_MAX))]
     pub(crate) over: f32,
 }
 

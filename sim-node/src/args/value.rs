@@ -42,6 +42,17 @@ pub(super) fn number_in(
     }
 }
 
+/// Parser of times up to a limit in seconds: a number of seconds, or a time with its unit.
+pub(super) fn seconds_up_to(max_s: f32) -> impl Fn(&str) -> Result<f32, String> + Clone {
+    move |text| {
+        let with_unit = || humantime::parse_duration(text).ok().map(|time| time.as_secs_f32());
+        let seconds = text.parse().ok().or_else(with_unit);
+        seconds.filter(|seconds| (0.0..=max_s).contains(seconds)).ok_or_else(|| {
+            format!("it must be a number of seconds from 0 to {max_s}, or a time such as 100ms")
+        })
+    }
+}
+
 /// Parser of numbers in a range that has a text of its own.
 pub(super) fn number_within(range: NumberRange) -> impl Fn(&str) -> Result<f32, String> + Clone {
     move |text| {

@@ -47,9 +47,27 @@ impl Outcome {
 /// Returns the text of a rejection: the meaning of its reason, the allowed values and the action.
 pub(crate) fn cause(reason: Option<Reason>, allowed: Option<&str>, action: &Action) -> String {
     let meaning = reason.map_or_else(|| "for an unknown reason".to_owned(), |one| one.to_string());
-    let allowed = allowed.map_or_else(String::new, |allowed| format!(" (allowed: {allowed})"));
+    let remedy = match (allowed, reason) {
+        (Some(allowed), _) => Some(format!("allowed: {allowed}")),
+        (None, Some(Reason::NoEffectHere)) => missing_condition(action).map(ToOwned::to_owned),
+        _ => None,
+    };
+    let remedy = remedy.map_or_else(String::new, |remedy| format!(" ({remedy})"));
     let action = serde_json::to_string(action).unwrap_or_default();
-    format!("{meaning}{allowed}: {action}")
+    format!("{meaning}{remedy}: {action}")
+}
+
+/// Returns the condition under which an action has an effect, in words.
+fn missing_condition(action: &Action) -> Option<&'static str> {
+    Some(match action {
+        Action::Step { .. } => "the node runs; pause() pauses it",
+        Action::Pin { .. }
+        | Action::Unpin { .. }
+        | Action::Grab { .. }
+        | Action::Move { .. }
+        | Action::Release { .. } => "the particle is frozen; reset() restores it",
+        _ => return action.missing_condition(),
+    })
 }
 
 /// Returns the indices of `count` elements in words.

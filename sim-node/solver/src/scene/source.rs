@@ -31,6 +31,12 @@ pub enum LoadError {
         stem = Path::new(.0.as_str()).file_stem().unwrap_or_default().display()
     )]
     Mesh(String),
+    /// The source is a recording.
+    #[error(
+        "{0} is a recording, not a scene: `recorder scene {0} > {stem}.toml` writes its scene",
+        stem = Path::new(.0.as_str()).file_stem().unwrap_or_default().display()
+    )]
+    Recording(String),
     /// The text of the scene is wrong.
     #[error(transparent)]
     Wrong(#[from] SceneError),
@@ -43,9 +49,8 @@ pub fn is_path(source: &str) -> bool {
     source.contains('/') || source.ends_with(".toml")
 }
 
-/// Returns `true` for a file of a mesh that `sim-node import` reads.
-fn is_mesh(source: &str) -> bool {
-    Path::new(source).extension().is_some_and(|extension| extension.eq_ignore_ascii_case("obj"))
+fn has_extension(source: &str, expected: &str) -> bool {
+    Path::new(source).extension().is_some_and(|extension| extension.eq_ignore_ascii_case(expected))
 }
 
 impl Scene {
@@ -61,8 +66,11 @@ impl Scene {
         source: &str,
         read_file: &dyn Fn(&Path) -> Result<String, String>,
     ) -> Result<Self, LoadError> {
-        if is_mesh(source) {
+        if has_extension(source, "obj") {
             return Err(LoadError::Mesh(source.to_owned()));
+        }
+        if has_extension(source, "mcap") {
+            return Err(LoadError::Recording(source.to_owned()));
         }
         if !is_path(source) {
             let text =
@@ -96,6 +104,13 @@ mod tests {
                 )
             );
         }
+    }
+
+    #[test]
+    fn a_recording_is_refused_with_the_command_that_writes_its_scene() {
+        let error = Scene::load("runs/a.mcap", &|_| Err("read".to_owned())).unwrap_err();
+        let expected = "runs/a.mcap is a recording, not a scene: `recorder scene runs/a.mcap > a.toml` writes its scene";
+        assert_eq!(error.to_string(), expected);
     }
 
     #[test]

@@ -23,6 +23,7 @@ impl Scene {
             settings::listed_order(self),
             settings::no_tether_root(self, &model),
             settings::upside_down(self),
+            settings::gravity_of_meters(self),
             settings::wind_without_surface(self, &model),
             settings::fast_contacts(self, &model),
             settings::contact_without_surface(self, &model),

@@ -28,6 +28,21 @@ pub(super) fn upside_down(scene: &Scene) -> Option<String> {
     (along > 0.0).then(|| format!("up is \"{name}\", but gravity points up, too: things fall up"))
 }
 
+/// Gravity in m/s² in a scene with another unit of length.
+pub(super) fn gravity_of_meters(scene: &Scene) -> Option<String> {
+    let unit = scene.unit.as_str();
+    let on_earth = match unit {
+        "cm" => 981,
+        "mm" => 9810,
+        _ => return None,
+    };
+    let [x, y, z] = scene.gravity;
+    let gravity = (x * x + y * y + z * z).sqrt();
+    let is_of_meters = (9.7..9.9).contains(&gravity);
+    is_of_meters
+        .then(|| format!("gravity is {gravity} {unit}/s², but on Earth it is {on_earth} {unit}/s²"))
+}
+
 pub(super) fn wind_without_surface(scene: &Scene, model: &Model) -> Option<String> {
     (scene.wind.is_some() && model.triangles.is_empty())
         .then(|| "the wind has no effect: it acts on triangles, and the scene has none".to_owned())
