@@ -178,6 +178,14 @@ def test_many_commands_are_sent_before_the_first_answer(start_node: StartNode) -
     assert sequences == sorted(sequences)
 
 
+def test_a_paused_node_has_a_complete_state(start_node: StartNode) -> None:
+    node = start_node("curtain")
+    with pytest.raises(catenary.Rejected, match=r"the node runs; pause\(\) pauses it"):
+        node.step(3)
+    node.pause()
+    assert node.state().hash == node.latest().hash
+
+
 def test_states_are_taken_restored_and_rewound(start_node: StartNode) -> None:
     node = start_node("curtain", "--paused")
     node.grab(90, (0.5, 0.2, 0.3), over=0.25)

@@ -80,6 +80,22 @@ fn a_recorder_that_waits_for_a_node_refuses_an_unusable_output_first() {
 }
 
 #[test]
+fn times_in_exported_data_are_those_of_the_run() {
+    let sandbox = Sandbox::new();
+    let (file, table) = (sandbox.path("late.mcap"), sandbox.path("late.csv"));
+    let args = ["run", "rope", "--rate", "200", "--paused"];
+    let _node = Process::start_ready(Program::SimNode, &sandbox, &args);
+    ctl(&sandbox, &["step", "30"]);
+    let recording = record(&sandbox, &file);
+    ctl(&sandbox, &["step", "10"]);
+    recording.interrupt().success();
+    recorder(&sandbox, &["export", &file, "--csv", &table]).success();
+    let text = std::fs::read_to_string(&table).unwrap();
+    assert!(text.lines().nth(1).unwrap().starts_with("30,0.15,0,"), "{}", &text[..200]);
+    assert!(text.lines().last().unwrap().starts_with("40,0.2,"));
+}
+
+#[test]
 fn a_limit_on_the_size_of_files_ends_an_export_with_the_name_of_the_output() {
     let sandbox = Sandbox::new();
     let file = sandbox.path("run.mcap");
