@@ -9,6 +9,7 @@ import subprocess
 import threading
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import catenary
 import numpy as np
@@ -176,6 +177,22 @@ def test_many_commands_are_sent_before_the_first_answer(start_node: StartNode) -
     assert len(long.outcomes) == 3000
     sequences = [outcome.sequence for outcome in batch.outcomes]
     assert sequences == sorted(sequences)
+
+
+def test_a_scene_that_cannot_be_loaded_is_refused_with_its_cause(
+    start_node: StartNode, tmp_path: Path
+) -> None:
+    node = start_node("rope", "--paused")
+    with pytest.raises(catenary.SceneError, match="nofile.toml: cannot read the scene"):
+        node.load("./nofile.toml")
+    wrong = tmp_path / "wrong.toml"
+    wrong.write_text("version = 1\n[solver]\nrate = 60\n")
+    with pytest.raises(catenary.SceneError, match="wrong.toml:3: solver.rate: unknown key"):
+        node.load(wrong)
+    with pytest.raises(catenary.SceneError, match="no built-in scene 'curtian'"):
+        node.load("curtian")
+    wrong.write_text("version = 1\n")
+    assert node.load(wrong).is_applied
 
 
 def test_a_paused_node_has_a_complete_state(start_node: StartNode) -> None:

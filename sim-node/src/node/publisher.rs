@@ -69,10 +69,11 @@ pub(crate) struct Publisher {
     same_state_count: u64,
     /// Number of published snapshots, modulo 2^32.
     snapshot_count: u32,
-    /// The next snapshot needs a keyframe.
-    is_keyframe_due: bool,
-    /// So does the one after it, for a reader that was counted before it could receive the first.
-    is_second_keyframe_due: bool,
+    /// Number of the next snapshots that need a keyframe: two for a reader that has joined, because it is counted before it
+    /// can receive the first one.
+    keyframes_due: u32,
+    /// A reader has joined since the newest keyframe.
+    is_reader_waiting: bool,
     keyframe_step: u64,
     readers: ReaderCounts,
     /// A reader has joined the keyframes, and perhaps not yet the particles.
@@ -121,8 +122,8 @@ impl Publisher {
             last: SnapshotHeader::default(),
             same_state_count: 0,
             snapshot_count: 0,
-            is_keyframe_due: true,
-            is_second_keyframe_due: false,
+            keyframes_due: 1,
+            is_reader_waiting: false,
             keyframe_step: 0,
             readers: ReaderCounts::default(),
             is_reader_joining: false,
@@ -212,14 +213,21 @@ impl Publisher {
         if is_same_state && self.same_state_count + 1 == self.outcome_count {
             self.same_state_count = self.outcome_count;
         }
-        self.is_keyframe_due |= matches!(result, Ok(Applied::State | Applied::InPlace));
+        if result.is_ok_and(|applied| applied != Applied::Target) {
+            self.request_keyframe();
+        }
     }
 
     /// Logs a release that no client asked for, at the boundary before `step`.
     pub(crate) fn add_disconnection(&mut self, step: u64, release: Command) {
         let outcome = Outcome::new(self.outcome_count, step, release, Ok(()));
         self.log(&outcome, OUTCOME_FLAG_DISCONNECTED);
-        self.is_keyframe_due = true;
+        self.request_keyframe();
+    }
+
+    /// Lets the next snapshot have a keyframe.
+    fn request_keyframe(&mut self) {
+        self.keyframes_due = self.keyframes_due.max(1);
     }
 
     fn log(&mut self, outcome: &Outcome, flags: u32) {
@@ -234,7 +242,9 @@ impl Publisher {
         position: Position,
         times: StepTimes,
     ) -> anyhow::Result<()> {
-        self.is_keyframe_due |= position.step.is_multiple_of(u64::from(self.rate_hz));
+        if position.step.is_multiple_of(u64::from(self.rate_hz)) {
+            self.request_keyframe();
+        }
         self.times = times;
         self.publish_colliders(solver, position.step)?;
         self.publish_tears(solver, position.step)?;
@@ -259,9 +269,9 @@ impl Publisher {
 
     fn publish_snapshot(&mut self, solver: &Solver, position: Position) -> anyhow::Result<()> {
         self.watch_keyframe_readers();
-        if self.is_keyframe_due {
+        if self.keyframes_due > 0 {
             self.publish_keyframe(solver, position)?;
-            self.is_keyframe_due = std::mem::take(&mut self.is_second_keyframe_due);
+            self.keyframes_due -= 1;
         }
         self.publish_outcomes()?;
         self.last = self.header(solver, position);
@@ -353,13 +363,13 @@ impl Publisher {
         self.watch_keyframe_readers();
         let is_untouched =
             self.last.step == position.step && self.same_state_count == self.outcome_count;
-        if is_untouched && self.keyframe_step == position.step {
-            // A reader that joins now receives it, because it is latched.
-            (self.is_keyframe_due, self.is_second_keyframe_due) = (false, false);
-        }
-        if self.is_keyframe_due && is_untouched {
-            self.publish_keyframe(solver, position)?;
-            self.owner.wake(Wake::Frame);
+        if self.is_reader_waiting && is_untouched {
+            // The reader receives a keyframe that exists, because it is latched.
+            if self.keyframe_step != position.step {
+                self.publish_keyframe(solver, position)?;
+                self.owner.wake(Wake::Frame);
+            }
+            (self.keyframes_due, self.is_reader_waiting) = (0, false);
         }
         self.publish_outcomes()
     }
@@ -382,7 +392,7 @@ impl Publisher {
         self.is_reader_joining |= now.keyframe > before.keyframe;
         let has_joined = self.is_reader_joining && now.particles > before.particles;
         if now.keyframe > before.keyframe || has_joined {
-            (self.is_keyframe_due, self.is_second_keyframe_due) = (true, true);
+            (self.keyframes_due, self.is_reader_waiting) = (2, true);
         }
         self.is_reader_joining &= !has_joined;
         self.readers = now;
@@ -404,7 +414,7 @@ impl Publisher {
             outcome_count: self.outcome_count,
         };
         self.owner.publish_keyframe(header, &bytes)?;
-        self.is_keyframe_due = false;
+        self.is_reader_waiting = false;
         self.keyframe_step = position.step;
         Ok(())
     }

@@ -63,6 +63,8 @@ class Node(Commands[Outcome], _catenary.Node):
         """Replaces the scene: the name of a built-in one, or a path on the host of the node.
 
         A scene with another rate begins a new run at step 0 (`Outcome.begins_run`).
+
+        Raises `SceneError` for a scene that is wrong or cannot be read.
         """
         return self._shown(self.request(Action.load(scene)))
 

@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use sim_contract::{ConstraintKind, GRAB_OVER_S_DEFAULT, KindFilter, Text};
-use sim_solver::builtin;
-use sim_solver::scene::{LoadError, is_path};
+use sim_contract::{ConstraintKind, GRAB_OVER_S_DEFAULT, KindFilter, Text, read_scene_file};
+use sim_solver::Scene;
+use sim_solver::scene::is_path;
 
 use crate::arguments;
 use crate::convert::{Quaternion, Vector, from_json, parameter_value};
@@ -25,14 +25,14 @@ fn text(text: &str) -> PyResult<Text> {
     Text::new(text).map_err(|error| PyValueError::new_err(error.to_string()))
 }
 
-/// Returns a scene as the node finds it, whose working directory may differ from this one.
+/// Returns a scene as the node finds it, whose working directory may differ from this one. Checks it first, because an
+/// outcome has no room for the place of an error.
 fn scene_text(scene: &Path) -> PyResult<Text> {
     let name = scene.to_string_lossy();
+    let read = |path: &Path| read_scene_file(path).map_err(|error| error.to_string());
+    Scene::load(&name, &read).map_err(|error| load_error(&error))?;
     if is_path(&name) {
         return text(&std::path::absolute(scene)?.to_string_lossy());
-    }
-    if builtin::text(&name).is_none() {
-        return Err(load_error(&LoadError::UnknownName(name.into_owned())));
     }
     text(&name)
 }

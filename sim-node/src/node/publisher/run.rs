@@ -75,6 +75,6 @@ impl Publisher {
         (self.last, self.snapshot_count, self.keyframe_step) = (SnapshotHeader::default(), 0, 0);
         (self.outcome_count, self.same_state_count, self.rejected_count) = (0, 0, 0);
         (self.since_step, self.included_step) = (0, 0);
-        self.is_keyframe_due = true;
+        self.request_keyframe();
     }
 }

@@ -52,7 +52,10 @@ impl Cells {
         let longest = (Vec3::from_array(bounds.max) - origin).max_element();
         let places = vec![Place::NearSurface; SIDE * SIDE * SIDE];
         let mut cells = Self { origin, scale: SIDE as f32 / longest, rounding, places };
-        cells.fill(Block { first: [0; 3], side: SIDE }, height);
+        // A solid without an extent has no cells.
+        if cells.scale.is_finite() {
+            cells.fill(Block { first: [0; 3], side: SIDE }, height);
+        }
         cells
     }
 
