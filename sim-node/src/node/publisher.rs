@@ -75,6 +75,8 @@ pub(crate) struct Publisher {
     /// A reader has joined since the newest keyframe.
     is_reader_waiting: bool,
     keyframe_step: u64,
+    /// Number of outcomes that the newest keyframe counts.
+    keyframe_outcome_count: u64,
     readers: ReaderCounts,
     /// A reader has joined the keyframes, and perhaps not yet the particles.
     is_reader_joining: bool,
@@ -125,6 +127,7 @@ impl Publisher {
             keyframes_due: 1,
             is_reader_waiting: false,
             keyframe_step: 0,
+            keyframe_outcome_count: 0,
             readers: ReaderCounts::default(),
             is_reader_joining: false,
             outcomes: Vec::new(),
@@ -355,6 +358,9 @@ impl Publisher {
     /// Publishes outcomes while the node waits, and a keyframe of the last snapshot for a reader that
     /// has joined since. A command that has changed the waiting state makes that keyframe
     /// impossible; the reader then receives the one of the next snapshot.
+    ///
+    /// A keyframe that exists is latched, so it is published again before outcomes that it does not count: a reader that
+    /// joins later receives none of them.
     pub(crate) fn publish_between(
         &mut self,
         solver: &Solver,
@@ -363,13 +369,17 @@ impl Publisher {
         self.watch_keyframe_readers();
         let is_untouched =
             self.last.step == position.step && self.same_state_count == self.outcome_count;
-        if self.is_reader_waiting && is_untouched {
-            // The reader receives a keyframe that exists, because it is latched.
-            if self.keyframe_step != position.step {
+        if is_untouched {
+            if self.is_reader_waiting {
+                self.keyframes_due = 0;
+            }
+            let exists = self.keyframe_step == position.step;
+            let is_outdated = exists && self.keyframe_outcome_count != self.outcome_count;
+            if is_outdated || (self.is_reader_waiting && !exists) {
                 self.publish_keyframe(solver, position)?;
                 self.owner.wake(Wake::Frame);
             }
-            (self.keyframes_due, self.is_reader_waiting) = (0, false);
+            self.is_reader_waiting = false;
         }
         self.publish_outcomes()
     }
@@ -415,7 +425,7 @@ impl Publisher {
         };
         self.owner.publish_keyframe(header, &bytes)?;
         self.is_reader_waiting = false;
-        self.keyframe_step = position.step;
+        (self.keyframe_step, self.keyframe_outcome_count) = (position.step, self.outcome_count);
         Ok(())
     }
 

@@ -186,6 +186,9 @@ fn a_recording_begins_at_the_state_at_which_a_node_has_paused_and_loses_nothing(
     assert_eq!(ctl(&sandbox, &["pin", "9999"])["status"], "rejected");
     ctl(&sandbox, &["set", "time_scale", "2"]);
     let paused = ctl(&sandbox, &["status"])["step"].as_u64().unwrap();
+    // A reader before this one has received the keyframe, and another command follows.
+    recorder(&sandbox, &["state", "-o", &sandbox.path("state.mcap")]).success();
+    ctl(&sandbox, &["mark", "end"]);
     let recording = record(&sandbox, &file);
     ctl(&sandbox, &["pin", "90"]);
     ctl(&sandbox, &["step", "20"]);

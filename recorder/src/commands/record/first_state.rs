@@ -60,9 +60,12 @@ impl FirstState {
     /// again. Ignores keyframes of other states.
     pub(crate) fn add_keyframe(&mut self, keyframe: &KeyframeHeader, bytes: &[u8]) {
         let change = Change::Keyframe(*keyframe, bytes.to_vec());
-        if is_keyframe_of(&change, &self.header) && !self.has_keyframe() {
+        if !is_keyframe_of(&change, &self.header) {
+            return;
+        }
+        self.header.outcome_count = self.header.outcome_count.max(keyframe.outcome_count);
+        if !self.has_keyframe() {
             self.changes.push(change);
-            self.header.outcome_count = self.header.outcome_count.max(keyframe.outcome_count);
         }
     }
 }

@@ -74,6 +74,7 @@ impl Publisher {
         (self.run_id, self.rate_hz) = (run_id, rate_hz);
         (self.last, self.snapshot_count, self.keyframe_step) = (SnapshotHeader::default(), 0, 0);
         (self.outcome_count, self.same_state_count, self.rejected_count) = (0, 0, 0);
+        self.keyframe_outcome_count = 0;
         (self.since_step, self.included_step) = (0, 0);
         self.request_keyframe();
     }
