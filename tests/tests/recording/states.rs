@@ -102,13 +102,14 @@ fn a_state_continues_in_another_process_with_the_same_hashes() {
 fn the_state_of_a_paused_node_is_complete_until_a_command_changes_it() {
     let sandbox = Sandbox::new();
     let file = sandbox.path("state.mcap");
-    let _node = node(&sandbox, &["run", "curtain"]);
-    ctl(&sandbox, &["pause"]);
+    let _node = node(&sandbox, &["run", "curtain", "--paused"]);
+    // Only the first of these steps has a keyframe.
+    step(&sandbox, 10);
     ctl(&sandbox, &["mark", "here"]);
     recorder(&sandbox, &["state", "-o", &file]);
     let [only] = &frames(&file)[..] else { panic!("not one step") };
-    assert_eq!(ctl(&sandbox, &["status"])["step"].as_u64(), Some(only.row.step));
-    ctl(&sandbox, &["step", "3"]);
+    assert_eq!(only.row.step, 10);
+    step(&sandbox, 3);
     ctl(&sandbox, &["pin", "90"]);
     let args = ["state", "-o", &file, "--overwrite"];
     let refused = Process::run(Program::Recorder, &sandbox, &args);
