@@ -63,7 +63,6 @@ pub mod verification;
 
 pub use complete_state::{CompleteState, CompleteStateError, complete_state};
 pub use log::*;
-pub use recorded_scene::mesh_files::{MeshFile, mesh_files};
 pub use recorded_scene::{RecordedSceneError, recorded_scene, scene_to_simulate};
 pub use scene_drawing::{DrawnMesh, SCENE_TOPIC, SceneDrawing};
 pub use sim_contract::{Existing, PartFile, PartFileError};

@@ -40,9 +40,10 @@ pub use read::open::open_regular_file;
 pub use read::read_error::{LogEnd, ReadError};
 pub use read::reader::LogReader;
 pub use rows::{
-    AnchorForceRow, BendColumns, ColliderForceRow, ColliderRow, CollidersRow, EventRow, ForcesRow,
-    OutcomeRow, ParametersRow, ShapeRow, Softness, StatusRow, StepRow, SurfaceRow, TearsRow,
-    TopologyRow, bend_state, constraint_state,
+    AnchorForceRow, BendColumns, ColliderBodyRow, ColliderDetails, ColliderForceRow, ColliderRow,
+    CollidersRow, EventRow, ForcesRow, MeshFile, OutcomeRow, ParametersRow, SceneColliders,
+    ShapeRow, Softness, StatusRow, StepRow, SurfaceRow, TearsRow, TopologyRow, bend_state,
+    constraint_state,
 };
 pub(crate) use run::BENDS_VERSION;
 pub use run::selection::ContentSelection;

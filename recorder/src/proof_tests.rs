@@ -13,7 +13,8 @@ use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
 
 use crate::log::{
-    Closing, LogEnd, LogOptions, LogReader, LogWriter, Message, TimedCommand, Topic, parse_commands,
+    Closing, LogEnd, LogOptions, LogReader, LogWriter, Message, SceneColliders, TimedCommand,
+    Topic, parse_commands,
 };
 use sim_contract::Action;
 use sim_solver::{SOLVER_VERSION, Scene, Solver, builtin};
@@ -48,6 +49,7 @@ fn record(job: &Job) -> (Vec<u8>, SimulationResult) {
     // Small chunks, so that a truncated file still has some.
     let options = LogOptions { chunk_size_bytes: 100_000, ..LogOptions::default() };
     let mut log = LogWriter::create(Vec::new(), options, &run, scene.as_bytes(), 0).unwrap();
+    log.describe_colliders(&SceneColliders::new(&job.scene)).unwrap();
     let outcomes =
         simulate(job, States::first(solver), Some(&mut log), &AtomicBool::new(false), |_| {})
             .unwrap();

@@ -1,7 +1,5 @@
 //! The scene in a recording.
 
-pub(crate) mod mesh_files;
-
 use std::io::Read;
 use std::str::Utf8Error;
 

@@ -1,4 +1,4 @@
-"""Reads the attachments of a recording with the stock MCAP reader, and prints them as JSON.
+"""Reads the attachments and the colliders of a recording with the stock MCAP reader, and prints them as JSON.
 
 usage: read_attachments.py RECORDING
 """
@@ -12,14 +12,16 @@ from xxhash import xxh3_64_hexdigest
 if len(sys.argv) != 2:
     sys.exit("usage: read_attachments.py RECORDING")
 with open(sys.argv[1], "rb") as file:
-    report = {}
-    for attachment in make_reader(file, validate_crcs=True).iter_attachments():
+    reader = make_reader(file, validate_crcs=True)
+    attachments = {}
+    for attachment in reader.iter_attachments():
         lines = attachment.data.decode().splitlines()
-        report[attachment.name] = {
+        attachments[attachment.name] = {
             "hash": xxh3_64_hexdigest(attachment.data),
             "vertices": [
                 [float(word) for word in line.split()[1:]] for line in lines if line.startswith("v ")
             ],
             "faces": [[int(word) for word in line.split()[1:]] for line in lines if line.startswith("f ")],
         }
-    print(json.dumps(report))
+    rows = [json.loads(message.data) for _, _, message in reader.iter_messages(topics=["/colliders"])]
+    print(json.dumps({"attachments": attachments, "colliders": [row["colliders"] for row in rows]}))

@@ -175,10 +175,17 @@ fn the_stock_python_reader_finds_the_mesh_of_a_collider() {
     let mesh = meshes.values().next().unwrap();
     for file in [simulated, live] {
         let read = python(&sandbox, "read_attachments.py", &[&file]);
-        let attachments = read.as_object().unwrap();
+        let attachments = read["attachments"].as_object().unwrap();
         assert_eq!(attachments.len(), 1 + meshes.len(), "{:?}", attachments.keys());
         let (name, obj) = attachments.iter().find(|(name, _)| *name != "scene.toml").unwrap();
         assert_eq!(*name, format!("{}.obj", obj["hash"].as_str().unwrap()));
+        let lists = read["colliders"].as_array().unwrap();
+        let meshes = lists.iter().flat_map(|list| list.as_array().unwrap());
+        let meshes: Vec<_> = meshes.filter(|one| one["shape"] == "mesh").collect();
+        assert!(!meshes.is_empty());
+        for one in meshes {
+            assert_eq!((one["path"].as_str(), &one["solid"]), (Some(name.as_str()), &json!(false)));
+        }
         let vertices: Vec<[f32; 3]> = serde_json::from_value(obj["vertices"].clone()).unwrap();
         assert_eq!(vertices, mesh.vertices);
         let faces: Vec<[u32; 3]> = serde_json::from_value(obj["faces"].clone()).unwrap();

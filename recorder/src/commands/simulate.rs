@@ -10,8 +10,8 @@ use anyhow::Context;
 use clap::error::ErrorKind;
 use recorder::simulation::{Job, SimulationResult, State, States, StepCount, simulate};
 use recorder::{
-    Closing, ContentSelection, LogEnd, LogReader, OutcomeRow, PartFile, TimedCommand, WriteError,
-    mesh_files,
+    Closing, ContentSelection, LogEnd, LogReader, OutcomeRow, PartFile, SceneColliders,
+    TimedCommand, WriteError,
 };
 use serde::Serialize;
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
@@ -260,7 +260,7 @@ fn begin(args: &SimulateArgs, path: &Path, job: &Job, solver: &Solver) -> anyhow
     let scene = job.scene.to_toml();
     let log = args.file.begin(file, selection, &job.description(solver), scene.as_bytes());
     let mut log = log.with_context(|| truncation(args))?;
-    log.attach_meshes(&mesh_files(&job.scene)).with_context(|| truncation(args))?;
+    log.describe_colliders(&SceneColliders::new(&job.scene)).with_context(|| truncation(args))?;
     Ok(log)
 }
 

@@ -12,13 +12,14 @@ use sim_contract::explain_write_error;
 
 use super::encoding::{MessageEncoder, ParticleBuffer, TopicFormat, encode_transform};
 use super::message::Message;
+use super::rows::ColliderDetails;
+use super::rows::{MeshFile, SceneColliders};
 use super::run::selection::{ContentSelection, SELECTION_METADATA};
 use super::run::{
     CLOSING_METADATA, Closing, RUN_METADATA, RunDescription, SCENE_ATTACHMENT, SCENE_MEDIA_TYPE,
     header_library,
 };
 use super::topic::{AllCounts, Topic};
-use crate::recorded_scene::mesh_files::MeshFile;
 use sink::{ChunkSink, SinkHandle};
 
 /// Bytes of an attachment to copy at a time.
@@ -104,6 +105,8 @@ pub struct LogWriter<W: Write> {
     /// Channel of each declared topic, in the order of [`Topic::ALL`].
     channels: Channels,
     encoder: MessageEncoder,
+    /// By collider. Empty until they are known.
+    collider_details: Vec<ColliderDetails>,
     /// Newest time of reception. Log times never decrease.
     log_time_ns: u64,
     /// The log time of the newest snapshot.
@@ -141,6 +144,7 @@ impl<W: Write> LogWriter<W> {
                     run: run.clone(),
                     channels,
                     encoder: MessageEncoder::default(),
+                    collider_details: Vec::new(),
                     log_time_ns,
                     snapshot_log_time_ns: None,
                     counts,
@@ -161,6 +165,8 @@ impl<W: Write> LogWriter<W> {
     /// If this or an earlier call failed, or for forces in a recording whose selection lacks them.
     pub fn write(&mut self, message: &Message, log_time_ns: u64) -> Result<(), WriteError> {
         let header = self.message_header(message.topic(), message.step(), log_time_ns)?;
+        let detailed = self.with_details(message);
+        let message = detailed.as_ref().unwrap_or(message);
         let data = self.encoder.encode(message, header.publish_time)?;
         let file = self.file.as_mut().ok_or(WriteError::Stopped)?;
         let result = file.write_to_known_channel(&header, data);
@@ -190,6 +196,13 @@ impl<W: Write> LogWriter<W> {
     /// Returns a buffer that is written, for the next particles.
     pub fn take_spare(&mut self) -> Option<ParticleBuffer> {
         self.sink.take_spare()
+    }
+
+    /// Returns the row of colliders with their details, if they are known.
+    fn with_details(&self, message: &Message) -> Option<Message> {
+        let Message::Colliders(row) = message else { return None };
+        let details = self.collider_details.as_slice();
+        (!details.is_empty()).then(|| Message::Colliders(row.clone().with_details(details)))
     }
 
     fn message_header(
@@ -245,12 +258,13 @@ impl<W: Write> LogWriter<W> {
         self.stop_on_error(result)
     }
 
-    /// Attaches the meshes of the scene as files.
+    /// Attaches the meshes of the scene as files, and adds the details of the colliders to their rows from now on.
     ///
     /// # Errors
     /// If this or an earlier call failed.
-    pub fn attach_meshes(&mut self, files: &[MeshFile]) -> Result<(), WriteError> {
-        files.iter().try_for_each(|MeshFile { name, text }| {
+    pub fn describe_colliders(&mut self, colliders: &SceneColliders) -> Result<(), WriteError> {
+        self.collider_details.clone_from(&colliders.details);
+        colliders.files.iter().try_for_each(|MeshFile { name, text }| {
             self.attach(name, text.len() as u64, text.as_bytes())
         })
     }

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::AtomicBool;
 
-use crate::log::{ContentSelection, ForcesRow, LogOptions, LogWriter, Message};
+use crate::log::{ContentSelection, ForcesRow, LogOptions, LogWriter, Message, SceneColliders};
 use sim_contract::PlainF32;
 use sim_solver::Solver;
 
@@ -21,6 +21,7 @@ fn record_forces(threads: usize) -> Vec<u8> {
     let selection = ContentSelection::default().with_forces();
     let options = LogOptions { selection, ..LogOptions::default() };
     let mut log = LogWriter::create(Vec::new(), options, &run, scene.as_bytes(), 0).unwrap();
+    log.describe_colliders(&SceneColliders::new(&job.scene)).unwrap();
     simulate(&job, States::first(solver), Some(&mut log), &AtomicBool::new(false), |_| {}).unwrap();
     finish(log, 0)
 }

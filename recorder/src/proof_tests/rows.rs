@@ -1,9 +1,11 @@
 //! The rows besides the snapshots: tears with their causes, colliders and events match the
 //! simulation, and a changed row is reported.
 
-use crate::log::{BendColumns, LogOptions, LogReader, LogWriter, Message, TearsRow, TopologyRow};
-use crate::recorded_scene::mesh_files::mesh_files;
-use sim_contract::{BlockValue, ParticleFlags};
+use crate::log::{
+    BendColumns, ColliderBodyRow, ColliderDetails, LogOptions, LogReader, LogWriter, Message,
+    SceneColliders, TearsRow, TopologyRow,
+};
+use sim_contract::{BlockValue, ParticleFlags, PlainF32};
 use sim_solver::Scene;
 
 use super::commands::{COMMANDS, SCENE, STEPS, collect, job, job_of};
@@ -286,21 +288,64 @@ fn the_bending_of_a_block_that_the_simulation_has_not_is_found() {
     assert_eq!(with_blocks(&[of(0, 0.03)]).verdict, Verdict::Identical);
 }
 
+/// A scene with a triangle of another program.
+fn mesh_scene(x: f32) -> String {
+    format!(
+        "version = 1\n[[particle]]\nposition = [0, 1, 0]\n[[collider]]\nshape = \"mesh\"\n\
+         vertices = [[{x}, 0, 0], [1, 0, 0], [0, 0, 1]]\nfaces = [[0, 1, 2]]\n\
+         body = {{ mass = 2, inertia = [1, 2, 3] }}\n"
+    )
+}
+
+fn mesh_colliders(x: f32) -> SceneColliders {
+    SceneColliders::new(&Scene::from_toml(&mesh_scene(x), "test").unwrap())
+}
+
+#[test]
+fn rows_of_colliders_name_the_mesh_and_the_body_and_are_compared_with_the_scene() {
+    let (file, _) = record(&job_of(&mesh_scene(0.25), ""));
+    let mut rows = Vec::new();
+    let mut with = |details: &ColliderDetails| {
+        rebuild(&file, |message| match message {
+            Message::Colliders(row) => {
+                rows.push(row.colliders[0].details.clone());
+                Some(Message::Colliders(row.with_details(std::slice::from_ref(details))))
+            }
+            other => Some(other),
+        })
+    };
+    let own = mesh_colliders(0.25);
+    let path = Some(own.files[0].name.clone());
+    let body = ColliderBodyRow { mass: PlainF32(2.0), inertia: [1.0, 2.0, 3.0].map(PlainF32) };
+    let details = ColliderDetails { path, solid: Some(false), body: Some(body) };
+    // Earlier builds wrote none.
+    for accepted in [&details, &ColliderDetails::default()] {
+        assert_eq!(check(&with(accepted)).0.verdict, Verdict::Identical);
+    }
+    for changed in [
+        ColliderDetails {
+            path: Some(mesh_colliders(0.5).files[0].name.clone()),
+            ..details.clone()
+        },
+        ColliderDetails { solid: Some(true), ..details.clone() },
+        ColliderDetails { body: None, ..details.clone() },
+    ] {
+        let report = check(&with(&changed)).0;
+        assert_eq!((report.verdict, report.step), (Verdict::Diverged, Some(0)), "{report}");
+        assert!(report.to_string().contains("/colliders: collider 0: recorded"), "{report}");
+    }
+    assert!(!rows.is_empty() && rows.iter().all(|one| *one == details), "{rows:?}");
+}
+
 #[test]
 fn attached_meshes_are_compared_with_those_of_the_scene() {
-    let mesh = |x: f32| {
-        format!(
-            "version = 1\n[[particle]]\nposition = [0, 1, 0]\n[[collider]]\nshape = \"mesh\"\n\
-             vertices = [[{x}, 0, 0], [1, 0, 0], [0, 0, 1]]\nfaces = [[0, 1, 2]]\n"
-        )
-    };
-    let files = |x: f32| mesh_files(&Scene::from_toml(&mesh(x), "test").unwrap());
-    let (own, other) = (files(0.25), files(0.5));
-    let (file, _) = record(&job_of(&mesh(0.25), ""));
+    let (own, other) = (mesh_colliders(0.25).files, mesh_colliders(0.5).files);
+    let (file, _) = record(&job_of(&mesh_scene(0.25), ""));
     let mut old = LogReader::new(file.as_slice()).unwrap();
     let (run, scene) = (old.run().clone(), old.scene().to_vec());
     let mut new = LogWriter::create(Vec::new(), LogOptions::default(), &run, &scene, 0).unwrap();
-    new.attach_meshes(&[own.clone(), other.clone()].concat()).unwrap();
+    let files = [own.clone(), other.clone()].concat();
+    new.describe_colliders(&SceneColliders { files, ..SceneColliders::default() }).unwrap();
     while let Some(logged) = old.next_message().unwrap() {
         new.write(&logged.message, logged.log_time_ns).unwrap();
     }

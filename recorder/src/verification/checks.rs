@@ -5,8 +5,8 @@ use std::sync::atomic::AtomicBool;
 use std::thread::Scope;
 
 use crate::log::{
-    AuditDifference, Frame, LogEnd, LogReader, Message, OutcomeRow, ReadError, RunDescription,
-    TearsRow, Topic,
+    AuditDifference, ColliderDetails, CollidersRow, Frame, LogEnd, LogReader, Message, OutcomeRow,
+    ReadError, RunDescription, SceneColliders, TearsRow, Topic,
 };
 use sim_contract::Action;
 use sim_solver::{Scene, Solver};
@@ -19,7 +19,6 @@ use super::read_ahead::{ReadAhead, ReadFrame};
 use super::resimulation::{Resimulation, ResimulationError};
 use super::snapshot_numbers::SnapshotNumbers;
 use crate::recorded_scene::RecordedSceneError;
-use crate::recorded_scene::mesh_files::mesh_files;
 use crate::simulation::frozen::FrozenParticles;
 use crate::simulation::run_id::RunId;
 
@@ -80,6 +79,7 @@ pub(super) struct Verification {
     run: RunDescription,
     format_version: u32,
     scene: Scene,
+    colliders: SceneColliders,
     threads: usize,
     range: StepRange,
     pub(super) simulation: Option<Resimulation>,
@@ -116,6 +116,7 @@ impl Verification {
             run: log.run().clone(),
             format_version: log.format_version(),
             frames: ReadAhead::start(threads, log).map_err(VerifyError::Thread)?,
+            colliders: SceneColliders::new(&scene),
             scene,
             threads: options.threads,
             range: options.range,
@@ -251,6 +252,7 @@ impl Verification {
             let what = match update {
                 Message::Outcome(row) => self.check_disconnected(row),
                 Message::Tears(row) => self.check_causes(row),
+                Message::Colliders(row) => self.check_details(row),
                 Message::Event(row) if self.is_simulated && row.is_of_member() => {
                     Some("/events: a simulation has no lockstep".to_owned())
                 }
@@ -278,6 +280,15 @@ impl Verification {
         let has_causes = self.format_version >= NUMBERED_VERSION;
         let is_wrong = has_causes && !is_complete || self.is_simulated && unknown_count > 0;
         is_wrong.then(|| "/tears: it has no cause for one of its constraints".to_owned())
+    }
+
+    /// Compares the details of colliders with the scene. Recordings of earlier builds have none.
+    fn check_details(&self, row: &CollidersRow) -> Option<String> {
+        let none = ColliderDetails::default();
+        let mut pairs = row.colliders.iter().zip(&self.colliders.details);
+        let place = pairs.position(|(one, own)| one.details != none && one.details != *own)?;
+        let [recorded, own] = [&row.colliders[place].details, &self.colliders.details[place]];
+        Some(format!("/colliders: collider {place}: recorded {recorded:?}, in the scene {own:?}"))
     }
 
     /// Adds the commands of a snapshot to the id of the run.
@@ -328,12 +339,10 @@ impl Verification {
             self.simulation.as_ref().map_or(0, Resimulation::earlier_count);
         self.coverage.given_count = self.simulation.as_ref().map_or(0, Resimulation::given_count);
         self.coverage.foreign.clone_from(&self.frames.seen.foreign);
-        if !self.frames.seen.mesh_files.is_empty() {
-            let own = mesh_files(&self.scene);
-            let is_other = |name: &&String| own.iter().all(|file| file.name != **name);
-            let others = self.frames.seen.mesh_files.iter().filter(is_other);
-            self.coverage.foreign.extend(others.map(|name| format!("attachment '{name}'")));
-        }
+        let own = &self.colliders.files;
+        let is_other = |name: &&String| own.iter().all(|file| file.name != **name);
+        let others = self.frames.seen.mesh_files.iter().filter(is_other);
+        self.coverage.foreign.extend(others.map(|name| format!("attachment '{name}'")));
     }
 
     /// Returns the steps whose states could not be simulated.

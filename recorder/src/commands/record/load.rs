@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use recorder::{MeshFile, Message, RunDescription, SurfaceRow, TopologyRow, mesh_files};
+use recorder::{Message, RunDescription, SceneColliders, SurfaceRow, TopologyRow};
 use sim_contract::clock::{monotonic_ns, realtime_ns};
 use sim_contract::{LoadHeader, LoadedScene, SnapshotHeader};
 use sim_solver::{Scene, SceneError};
@@ -13,8 +13,7 @@ pub(crate) struct RunHeader {
     pub(crate) run: RunDescription,
     /// The scene as TOML.
     pub(crate) scene: Vec<u8>,
-    /// The meshes of the colliders, as files.
-    pub(crate) meshes: Arc<[MeshFile]>,
+    pub(crate) colliders: Arc<SceneColliders>,
     /// The rows of the load.
     pub(crate) rows: Vec<Message>,
 }
@@ -50,7 +49,7 @@ pub(crate) struct Load {
     header: LoadHeader,
     scene: Scene,
     text: Vec<u8>,
-    meshes: Arc<[MeshFile]>,
+    colliders: Arc<SceneColliders>,
     topology: TopologyRow,
     surface: SurfaceRow,
     /// Wall clock of step 0, in nanoseconds since 1970.
@@ -63,7 +62,7 @@ impl Load {
         let scene = Scene::from_toml(text, "scene.toml")?;
         Ok(Self {
             header: loaded.header,
-            meshes: mesh_files(&scene).into(),
+            colliders: SceneColliders::new(&scene).into(),
             scene,
             text: loaded.scene.clone(),
             topology: TopologyRow::new(&loaded.header, &loaded.constraints, &loaded.bends),
@@ -107,7 +106,7 @@ impl Load {
         };
         let topology = TopologyRow { torn, ..self.topology.clone() };
         let rows = vec![Message::Topology(topology), Message::Surface(self.surface.clone())];
-        let meshes = Arc::clone(&self.meshes);
-        RunHeader { run, scene: self.text.clone(), meshes, rows }
+        let colliders = Arc::clone(&self.colliders);
+        RunHeader { run, scene: self.text.clone(), colliders, rows }
     }
 }

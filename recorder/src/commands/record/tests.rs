@@ -98,7 +98,7 @@ fn begun_queue(limit_bytes: usize) -> Queue {
         RunHeader {
             run: description(),
             scene: SCENE.to_vec(),
-            meshes: [].into(),
+            colliders: Arc::default(),
             rows: Vec::new(),
         },
         0,

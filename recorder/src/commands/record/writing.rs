@@ -191,7 +191,7 @@ impl Files {
             LogOptions { selection: self.options.selection, ..self.options.file.options() };
         let log = LogWriter::create(file, log_options, &header.run, &header.scene, log_time_ns);
         let mut log = log.with_context(|| incomplete(&part_path))?;
-        log.attach_meshes(&header.meshes).with_context(|| incomplete(&part_path))?;
+        log.describe_colliders(&header.colliders).with_context(|| incomplete(&part_path))?;
         self.options.extras.write(&mut log).with_context(|| incomplete(&part_path))?;
         self.position.set(number, log.size_bytes());
         self.open = Some(OpenFile { number, part_path, log, steps: None });

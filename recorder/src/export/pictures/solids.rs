@@ -183,7 +183,7 @@ fn clip(corners: &[DVec3], axis: DVec3, limit: f64) -> Vec<DVec3> {
 #[cfg(test)]
 mod tests {
     use glam::DVec2;
-    use recorder::ColliderRow;
+    use recorder::{ColliderDetails, ColliderRow};
     use sim_contract::PlainF32;
     use sim_solver::scene::Up;
 
@@ -280,6 +280,7 @@ mod tests {
             friction: PlainF32(0.0),
             velocity: [PlainF32(0.0); 3],
             angular_velocity: None,
+            details: ColliderDetails::default(),
         };
         let colliders = [near, cube(), bounds, plane_at([0.0, 1.0, 0.0], 0.0)].map(collider);
         let state = SceneState { colliders: colliders.into(), ..SceneState::default() };

@@ -9,13 +9,13 @@ use mcap::records::{AttachmentHeader, Channel, MessageHeader, SchemaHeader};
 
 use super::decode::LoggedMessage;
 use crate::log::encoding::{MessageEncoder, TopicFormat, encode_transform};
+use crate::log::rows::scene_colliders::mesh_file_name;
 use crate::log::run::selection::ContentSelection;
 use crate::log::run::{
     Closing, FORMAT_VERSION, REPAIR_METADATA, RunDescription, SCENE_ATTACHMENT, SCENE_MEDIA_TYPE,
     header_library,
 };
 use crate::log::topic::{AllCounts, Topic};
-use crate::recorded_scene::mesh_files::mesh_file_name;
 
 /// Most names of foreign content to keep.
 const FOREIGN_MAX: usize = 16;

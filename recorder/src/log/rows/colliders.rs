@@ -17,7 +17,7 @@ pub struct CollidersRow {
 }
 
 /// One collider. Its keys are those of its shape.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ColliderRow {
     /// The shape and its pose.
     #[serde(flatten)]
@@ -36,6 +36,35 @@ pub struct ColliderRow {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<[f32; 3]>")]
     pub angular_velocity: Option<Vector>,
+    /// The properties that a node does not publish. Only recordings have them.
+    #[serde(flatten)]
+    pub details: ColliderDetails,
+}
+
+/// The properties of a collider that are fixed at load.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ColliderDetails {
+    /// Meshes only: name of the attachment with the triangles, an OBJ file with the scale applied.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<String>")]
+    pub path: Option<String>,
+    /// Meshes only: true if the triangles enclose a solid, which particles inside leave.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub solid: Option<bool>,
+    /// The rigid body that another program moves.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub body: Option<ColliderBodyRow>,
+}
+
+/// Mass of a rigid body.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ColliderBodyRow {
+    /// In kg.
+    #[schemars(with = "f32")]
+    pub mass: PlainF32,
+    /// Principal moments of inertia, in kg m^2.
+    #[schemars(with = "[f32; 3]")]
+    pub inertia: Vector,
 }
 
 /// The shape and pose of a collider, in m.
@@ -141,6 +170,15 @@ impl CollidersRow {
         Some(Self { step, colliders })
     }
 
+    /// Returns the row with the details of the colliders, by index.
+    #[must_use]
+    pub fn with_details(mut self, details: &[ColliderDetails]) -> Self {
+        for (collider, details) in self.colliders.iter_mut().zip(details) {
+            collider.details = details.clone();
+        }
+        self
+    }
+
     /// Returns the list as it was published.
     pub fn states(&self) -> Vec<ColliderState> {
         self.colliders.iter().map(ColliderRow::state).collect()
@@ -158,6 +196,7 @@ impl ColliderRow {
             friction: PlainF32(state.friction),
             velocity: plain(state.velocity),
             angular_velocity: turns.then_some(angular_velocity),
+            details: ColliderDetails::default(),
         })
     }
 

@@ -45,7 +45,7 @@ pub(super) fn header() -> RunHeader {
         contract_version: 1,
         recorder_version: "0".to_owned(),
     };
-    RunHeader { run, scene: b"version = 1".to_vec(), meshes: [].into(), rows: Vec::new() }
+    RunHeader { run, scene: b"version = 1".to_vec(), colliders: Arc::default(), rows: Vec::new() }
 }
 
 /// A recording that keeps two files and has written two, `run_0000.mcap` and `run_0001.mcap`.

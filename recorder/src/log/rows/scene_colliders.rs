@@ -1,10 +1,22 @@
-//! The meshes of a scene as files, for other programs. The scene itself has them, too.
+//! The colliders of a scene, for programs that read a recording without its scene.
 
 use std::fmt::Write;
 
+use sim_contract::PlainF32;
 use sim_solver::Scene;
-use sim_solver::scene::ColliderMesh;
+use sim_solver::scene::{ColliderMesh, SceneCollider};
 use xxhash_rust::xxh3::xxh3_64;
+
+use super::colliders::{ColliderBodyRow, ColliderDetails};
+
+/// The meshes and details of the colliders of a scene.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct SceneColliders {
+    /// The meshes, each once.
+    pub files: Vec<MeshFile>,
+    /// By collider.
+    pub details: Vec<ColliderDetails>,
+}
 
 /// A mesh as an OBJ file.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -15,17 +27,37 @@ pub struct MeshFile {
     pub text: String,
 }
 
-/// Returns the meshes of the colliders, each once.
-pub fn mesh_files(scene: &Scene) -> Vec<MeshFile> {
-    let mut files: Vec<MeshFile> = Vec::new();
-    for mesh in scene.collider_meshes().values() {
+impl SceneColliders {
+    /// Returns those of a scene.
+    pub fn new(scene: &Scene) -> Self {
+        let mut all = Self::default();
+        for collider in &scene.colliders {
+            let path = collider.mesh.as_ref().map(|mesh| all.add(mesh));
+            all.details.push(details(collider, path));
+        }
+        all
+    }
+
+    /// Adds a mesh, unless it is there. Returns the name of its file.
+    fn add(&mut self, mesh: &ColliderMesh) -> String {
         let text = obj_text(mesh);
         let name = mesh_file_name(text.as_bytes());
-        if files.iter().all(|file| file.name != name) {
-            files.push(MeshFile { name, text });
+        if self.files.iter().all(|file| file.name != name) {
+            self.files.push(MeshFile { name: name.clone(), text });
         }
+        name
     }
-    files
+}
+
+fn details(collider: &SceneCollider, path: Option<String>) -> ColliderDetails {
+    ColliderDetails {
+        path,
+        solid: collider.mesh.as_ref().map(|mesh| mesh.is_solid),
+        body: collider.body.map(|body| ColliderBodyRow {
+            mass: PlainF32(body.mass),
+            inertia: body.inertia.map(PlainF32),
+        }),
+    }
 }
 
 /// Returns the name of a mesh with this content.
@@ -64,7 +96,7 @@ mod tests {
             collider("[0, 9, 0]", "0.2")
         );
         let scene = Scene::from_toml(&text, "test").unwrap();
-        let files = mesh_files(&scene);
+        let SceneColliders { files, details } = SceneColliders::new(&scene);
         let texts: Vec<_> = files.iter().map(|file| file.text.as_str()).collect();
         assert_eq!(
             texts,
@@ -73,6 +105,10 @@ mod tests {
         for file in &files {
             assert_eq!(file.name, format!("{:016x}.obj", xxh3_64(file.text.as_bytes())));
         }
-        assert_eq!(mesh_files(&Scene::from_toml("version = 1", "test").unwrap()), []);
+        let paths: Vec<_> = details.iter().map(|one| one.path.as_deref()).collect();
+        let [first, second] = [&files[0], &files[1]].map(|file| Some(file.name.as_str()));
+        assert_eq!(paths, [first, first, second]);
+        let empty = Scene::from_toml("version = 1", "test").unwrap();
+        assert_eq!(SceneColliders::new(&empty), SceneColliders::default());
     }
 }
