@@ -229,6 +229,7 @@ impl Solver {
     pub(crate) fn scene_fields(&self, parameters: &Parameters) -> SceneFields {
         SceneFields {
             colliders: !self.colliders.is_empty(),
+            bounces: self.colliders.iter().any(|collider| collider.restitution > 0.0),
             wind: !self.model.triangles.is_empty() && parameters.wind_drag > 0.0,
             bend_multipliers: !self.model.bends.is_empty() && parameters.iterations > 1,
             tethers: self.settings.tethers as usize,

@@ -314,7 +314,8 @@ impl ParticleStore {
         }
     }
 
-    /// Displacement of a particle before any constraint or contact of the substep, in a scene with colliders.
+    /// Displacement of a particle before any constraint or contact of the substep, 0 in a
+    /// scene without bounces.
     pub(crate) fn predicted(&self, location: Location) -> [f32; 3] {
         match self.rows(location) {
             None => self.graph.predicted(location.index()),

@@ -26,6 +26,8 @@ pub(crate) struct Obstacle {
 pub(crate) struct Surface {
     linear: Vec3,
     angular: Vec3,
+    /// True if both velocities are 0.
+    pub(crate) is_still: bool,
     /// Center of the collider.
     pub(crate) pivot: Vec3,
     pub(crate) restitution: f32,
@@ -103,6 +105,7 @@ impl Surface {
         Self {
             linear: collider.linear,
             angular: collider.angular,
+            is_still: [collider.linear, collider.angular] == [Vec3::ZERO; 2],
             pivot: collider.pivot(substep.interval.end),
             restitution: collider.restitution,
             friction: collider.friction,

@@ -15,7 +15,7 @@ pub(crate) trait ParticleBlock {
     fn first(&self) -> usize;
     fn inverse_mass(&self, index: usize) -> f32;
     fn path(&self, index: usize) -> SubstepPath;
-    /// Displacement before any constraint or contact.
+    /// Displacement before any constraint or contact; 0 in a scene without bounces.
     fn predicted(&self, index: usize) -> Vec3;
     fn set_displacement(&mut self, index: usize, displacement: Vec3);
     /// Paths of the particles 8 `group`, ..., 8 `group` + 7; likewise below.

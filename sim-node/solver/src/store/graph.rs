@@ -47,7 +47,7 @@ pub(crate) struct Graph {
     /// By particle: its index in the scene, ascending.
     indices: Vec<u32>,
     /// By group of eight particles, padding included: the predicted displacements; empty in scenes without
-    /// colliders.
+    /// bounces.
     predicted: Vec<[Lanes8; 3]>,
     /// By group of eight particles, padding included: the velocities that the wind adds in a substep; empty
     /// in scenes without wind.
@@ -168,9 +168,9 @@ impl Graph {
     /// Allocates the fields of the layout. Every constraint and bend is inactive afterwards.
     pub(crate) fn allocate(&mut self, model: &Model) {
         let Layout { constraints, scene, .. } = self.layout;
-        let SceneFields { colliders, wind, tethers, bend_multipliers, .. } = scene;
+        let SceneFields { bounces, wind, tethers, bend_multipliers, .. } = scene;
         let group_count = self.particles.len() / 8;
-        self.predicted = vec![[[0.0; 8]; 3]; if colliders { group_count } else { 0 }];
+        self.predicted = vec![[[0.0; 8]; 3]; if bounces { group_count } else { 0 }];
         self.gains = vec![[[0.0; 8]; 3]; if wind { group_count } else { 0 }];
         self.triangles = if wind { triangle_groups(model, &self.indices) } else { Vec::new() };
         let none = PackedTether { root: [0.0; 3], length: f32::INFINITY };
@@ -347,9 +347,9 @@ impl Graph {
         [x, y, z]
     }
 
-    /// Displacement before any constraint or contact, in a scene with colliders.
+    /// Displacement before any constraint or contact; 0 in a scene without bounces.
     pub(crate) fn predicted(&self, index: usize) -> [f32; 3] {
-        lane_of(&self.predicted[index / 8], index % 8)
+        self.predicted.get(index / 8).map_or([0.0; 3], |group| lane_of(group, index % 8))
     }
 
     /// Returns the particles, and the padding behind them.

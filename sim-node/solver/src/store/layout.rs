@@ -7,8 +7,10 @@ use crate::step::schedule::OptionalStages;
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 #[allow(clippy::struct_excessive_bools, reason = "each tells if one kind of field exists")]
 pub(crate) struct SceneFields {
-    /// For colliders: the predicted displacement.
+    /// Particles touch colliders, which takes no memory in the store.
     pub(crate) colliders: bool,
+    /// For colliders off which particles bounce: the predicted displacement.
+    pub(crate) bounces: bool,
     /// For wind: the velocity that it adds in a substep.
     pub(crate) wind: bool,
     /// For bends in several passes: their multipliers.

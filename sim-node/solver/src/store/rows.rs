@@ -130,9 +130,10 @@ impl Rows {
         self.vector(index, 4)
     }
 
-    /// Displacement before any constraint or contact, in a scene with colliders.
+    /// Displacement before any constraint or contact; 0 in a scene without bounces.
     pub(crate) fn predicted(&self, index: usize) -> [f32; 3] {
-        self.vector(index, STATE_FIELDS)
+        let has_bounces = self.layout.fields.scene.bounces;
+        if has_bounces { self.vector(index, STATE_FIELDS) } else { [0.0; 3] }
     }
 
     pub(crate) fn set_position(&mut self, index: usize, position: [f32; 3]) {

@@ -43,7 +43,11 @@ pub(super) fn respond<L: Lanes>(surface: &Surface, contact: &Contact<L>) -> Resp
     let Contact { path, normal, depth, rounding, before, predicted, .. } = *contact;
     let zero = L::splat(0.0);
     let push = scaled(normal, depth);
-    let carried = surface.displacement_at(sum(sum(path.start, path.displacement), push));
+    let carried = if surface.is_still {
+        [zero; 3]
+    } else {
+        surface.displacement_at(sum(sum(path.start, path.displacement), push))
+    };
     let relative = difference(before, carried);
     let out = dot(relative, normal);
     let sliding = difference(relative, scaled(normal, out));
@@ -54,11 +58,16 @@ pub(super) fn respond<L: Lanes>(surface: &Surface, contact: &Contact<L>) -> Resp
     let slide = dot(sliding, sliding).sqrt();
     let share = L::splat(1.0) - friction / slide;
     let kept = masked(scaled(sliding, share), friction.is_below(slide));
-    let approach = dot(difference(carried, predicted), normal);
+    let bounce = if surface.restitution > 0.0 {
+        let approach = dot(difference(carried, predicted), normal);
+        scaled(normal, bounce(surface, contact, approach))
+    } else {
+        [zero; 3]
+    };
     Response {
         displacement: difference(sum(path.displacement, push), difference(sliding, kept)),
         left: sum(carried, kept),
-        bounce: scaled(normal, bounce(surface, contact, approach)),
+        bounce,
     }
 }
 

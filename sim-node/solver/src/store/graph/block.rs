@@ -142,7 +142,8 @@ impl ParticleBlock for GraphBlock<'_> {
     }
 
     fn predicted(&self, index: usize) -> Vec3 {
-        Vec3::from_array(lane_of(&self.predicted[index / 8], index % 8))
+        let group = self.predicted.get(index / 8);
+        group.map_or(Vec3::ZERO, |group| Vec3::from_array(lane_of(group, index % 8)))
     }
 
     fn set_displacement(&mut self, index: usize, displacement: Vec3) {
@@ -164,7 +165,7 @@ impl ParticleBlock for GraphBlock<'_> {
 
     #[inline(always)]
     fn predicted_lanes<W: Wide>(&self, group: usize) -> [W; 3] {
-        load(&self.predicted[group])
+        self.predicted.get(group).map_or([W::splat(0.0); 3], load)
     }
 
     #[inline(always)]

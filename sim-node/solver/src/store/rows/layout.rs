@@ -43,7 +43,7 @@ impl RowLayout {
 
     /// Number of fields before the velocity that the wind adds.
     pub(crate) fn wind_at(&self) -> usize {
-        STATE_FIELDS + 3 * usize::from(self.fields.scene.colliders)
+        STATE_FIELDS + 3 * usize::from(self.fields.scene.bounces)
     }
 
     /// Number of fields before the root of a tether.

@@ -43,11 +43,11 @@ impl<'a> RowParticles<'a> {
         let (stride, count) = (layout.stride, layout.columns.div_ceil(8));
         let mut numbers = numbers;
         let rest = &mut numbers;
-        let SceneFields { colliders, wind, tethers, .. } = layout.fields.scene;
+        let SceneFields { bounces, wind, tethers, .. } = layout.fields.scene;
         let x = next_vector(rest, stride, count);
         let w = &*next_field(rest, stride, count);
         let d = next_vector(rest, stride, count);
-        let predicted = if colliders { Some(next_vector(rest, stride, count)) } else { None };
+        let predicted = if bounces { Some(next_vector(rest, stride, count)) } else { None };
         let wind = if wind { Some(next_vector(rest, stride, count)) } else { None };
         let wind = wind.map(|[x, y, z]| [&*x, &*y, &*z]);
         let wind = wind.filter(|_| layout.fields.is_wind_used);
@@ -72,16 +72,6 @@ fn next_vector<'a>(rest: &mut &'a mut [f32], stride: usize, count: usize) -> [&'
     let x = next_field(rest, stride, count);
     let y = next_field(rest, stride, count);
     [x, y, next_field(rest, stride, count)]
-}
-
-impl RowParticles<'_> {
-    #[inline(always)]
-    fn predicted_fields(&self) -> &[&mut [Lanes8]; 3] {
-        let Some(predicted) = &self.predicted else {
-            unreachable!("a particle touches a collider in a scene that has none")
-        };
-        predicted
-    }
 }
 
 #[inline(always)]
@@ -135,7 +125,7 @@ impl ParticleBlock for RowParticles<'_> {
     }
 
     fn predicted(&self, index: usize) -> Vec3 {
-        vector(self.predicted_fields(), index)
+        self.predicted.as_ref().map_or(Vec3::ZERO, |predicted| vector(predicted, index))
     }
 
     fn set_displacement(&mut self, index: usize, displacement: Vec3) {
@@ -154,7 +144,10 @@ impl ParticleBlock for RowParticles<'_> {
 
     #[inline(always)]
     fn predicted_lanes<W: Wide>(&self, group: usize) -> [W; 3] {
-        load(self.predicted_fields(), group)
+        match &self.predicted {
+            Some(predicted) => load(predicted, group),
+            None => [W::splat(0.0); 3],
+        }
     }
 
     #[inline(always)]
