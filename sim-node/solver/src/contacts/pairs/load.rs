@@ -107,19 +107,36 @@ pub(super) type LaneMasks = [u16; TILE];
 /// The pairs of a slot and an entry of a tile, such as another slot, that are near each other at load.
 #[derive(Debug, Clone, Default)]
 pub(super) struct LoadPairs {
-    /// First entry in `tiles` of each tile of slots, and the end of the last one.
-    starts: Vec<u32>,
-    /// By tile of slots: the tiles with entries that its slots never touch.
-    tiles: Vec<Untouchable>,
+    /// Pairs that never touch.
+    never: PairMasks,
     /// Pairs that touch at another distance, ascending, and the distance.
     closer: Vec<([u32; 2], f32)>,
 }
 
-/// Entries of a tile that the slots of another one never touch.
+/// A set of pairs of a slot and an entry of a tile.
+#[derive(Debug, Clone, Default)]
+pub(super) struct PairMasks {
+    /// First entry in `tiles` of each tile of slots, and the end of the last one.
+    starts: Vec<u32>,
+    /// By tile of slots: the tiles with entries of the set.
+    tiles: Vec<TileMasks>,
+}
+
+/// Entries of a tile that form pairs with the slots of another one.
 #[derive(Debug, Clone, Copy)]
-struct Untouchable {
+struct TileMasks {
     tile: u32,
     lanes: LaneMasks,
+}
+
+impl TileMasks {
+    /// The pairs with the slots of a tile.
+    fn pairs(&self, slot_tile: u32) -> impl Iterator<Item = [u32; 2]> + '_ {
+        (TILE_LENGTH * slot_tile..).zip(&self.lanes).flat_map(move |(slot, lanes)| {
+            let entries = (0..TILE_LENGTH).filter(move |lane| lanes & (1 << lane) != 0);
+            entries.map(move |lane| [slot, TILE_LENGTH * self.tile + lane])
+        })
+    }
 }
 
 impl LoadPairs {
@@ -153,51 +170,29 @@ impl LoadPairs {
     /// Enters pairs of a slot and an entry of a tile: those that never touch, and those that touch at
     /// another distance.
     pub(super) fn from_pairs(
-        mut never: Vec<[u32; 2]>,
+        never: Vec<[u32; 2]>,
         mut closer: Vec<([u32; 2], f32)>,
         slot_count: usize,
     ) -> Self {
-        never.sort_unstable_by_key(|pair| (pair.map(|one| one / TILE_LENGTH), *pair));
         closer.sort_unstable_by_key(|(pair, _)| *pair);
-        let mut load_pairs = Self { starts: Vec::new(), tiles: Vec::new(), closer };
-        load_pairs.enter(&never, slot_count.div_ceil(TILE));
-        load_pairs
-    }
-
-    /// Enters the pairs that never touch, which ascend by their tiles.
-    #[allow(clippy::cast_possible_truncation, reason = "at most 128 for each of 2^24 particles")]
-    fn enter(&mut self, never: &[[u32; 2]], tile_count: usize) {
-        let mut rest = never.iter().peekable();
-        for slot_tile in 0..tile_count as u32 {
-            let first = self.tiles.len();
-            self.starts.push(first as u32);
-            while let Some([slot, entry]) =
-                rest.next_if(|[slot, _]| slot / TILE_LENGTH == slot_tile)
-            {
-                let tile = entry / TILE_LENGTH;
-                if self.tiles[first..].last().is_none_or(|last| last.tile != tile) {
-                    self.tiles.push(Untouchable { tile, lanes: [0; TILE] });
-                }
-                let last = self.tiles.len() - 1;
-                self.tiles[last].lanes[(slot % TILE_LENGTH) as usize] |= 1 << (entry % TILE_LENGTH);
-            }
-        }
-        self.starts.push(self.tiles.len() as u32);
+        Self { never: PairMasks::new(never, slot_count), closer }
     }
 
     /// Returns a bit for each entry of a tile that a slot never touches, for each slot of a tile.
     #[inline(always)]
-    pub(super) fn untouchable(&self, [slots, entries]: [u32; 2]) -> LaneMasks {
-        let [first, end] = [slots, slots + 1].map(|tile| self.starts[tile as usize] as usize);
-        let known = self.tiles[first..end].iter().find(|one| one.tile == entries);
-        known.map_or([0; TILE], |one| one.lanes)
+    pub(super) fn untouchable(&self, tiles: [u32; 2]) -> LaneMasks {
+        self.never.of_tiles(tiles)
+    }
+
+    /// Returns all pairs that never touch.
+    pub(super) fn never(&self) -> impl Iterator<Item = [u32; 2]> + '_ {
+        self.never.pairs()
     }
 
     /// True if a slot and an entry of a tile never touch.
     #[inline(always)]
     pub(super) fn never_touch(&self, slot: u32, entry: u32) -> bool {
-        let masks = self.untouchable([slot, entry].map(|one| one / TILE_LENGTH));
-        masks[(slot % TILE_LENGTH) as usize] & (1 << (entry % TILE_LENGTH)) != 0
+        self.never.has(slot, entry)
     }
 
     /// Contact distance of a pair. Two slots ascend.
@@ -208,6 +203,58 @@ impl LoadPairs {
         }
         let found = self.closer.binary_search_by_key(&pair, |(pair, _)| *pair);
         found.map_or(thickness, |index| self.closer[index].1)
+    }
+}
+
+impl PairMasks {
+    pub(super) fn new(mut pairs: Vec<[u32; 2]>, slot_count: usize) -> Self {
+        pairs.sort_unstable_by_key(|pair| (pair.map(|one| one / TILE_LENGTH), *pair));
+        let mut masks = Self::default();
+        masks.enter(&pairs, slot_count.div_ceil(TILE));
+        masks
+    }
+
+    /// Enters pairs that ascend by their tiles.
+    #[allow(clippy::cast_possible_truncation, reason = "at most 128 for each of 2^24 particles")]
+    fn enter(&mut self, pairs: &[[u32; 2]], tile_count: usize) {
+        let mut rest = pairs.iter().peekable();
+        for slot_tile in 0..tile_count as u32 {
+            let first = self.tiles.len();
+            self.starts.push(first as u32);
+            while let Some([slot, entry]) =
+                rest.next_if(|[slot, _]| slot / TILE_LENGTH == slot_tile)
+            {
+                let tile = entry / TILE_LENGTH;
+                if self.tiles[first..].last().is_none_or(|last| last.tile != tile) {
+                    self.tiles.push(TileMasks { tile, lanes: [0; TILE] });
+                }
+                let last = self.tiles.len() - 1;
+                self.tiles[last].lanes[(slot % TILE_LENGTH) as usize] |= 1 << (entry % TILE_LENGTH);
+            }
+        }
+        self.starts.push(self.tiles.len() as u32);
+    }
+
+    fn pairs(&self) -> impl Iterator<Item = [u32; 2]> + '_ {
+        (0..).zip(self.starts.windows(2)).flat_map(|(slot_tile, range)| {
+            let tiles = &self.tiles[range[0] as usize..range[1] as usize];
+            tiles.iter().flat_map(move |masks| masks.pairs(slot_tile))
+        })
+    }
+
+    /// Returns a bit for each entry of a tile, for each slot of a tile.
+    #[inline(always)]
+    pub(super) fn of_tiles(&self, [slots, entries]: [u32; 2]) -> LaneMasks {
+        let [first, end] = [slots, slots + 1].map(|tile| self.starts[tile as usize] as usize);
+        let known = self.tiles[first..end].iter().find(|one| one.tile == entries);
+        known.map_or([0; TILE], |one| one.lanes)
+    }
+
+    /// True if a slot and an entry of a tile are a pair of the set.
+    #[inline(always)]
+    pub(super) fn has(&self, slot: u32, entry: u32) -> bool {
+        let masks = self.of_tiles([slot, entry].map(|one| one / TILE_LENGTH));
+        masks[(slot % TILE_LENGTH) as usize] & (1 << (entry % TILE_LENGTH)) != 0
     }
 }
 

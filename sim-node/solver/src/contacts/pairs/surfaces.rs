@@ -18,9 +18,8 @@ mod triangle_tile;
 mod triangle_tiles;
 
 use super::box_tree::Search;
-use super::load::{self, LoadPairs};
+use super::load::{self, LoadPairs, PairMasks};
 use super::order::{order_by_key, order_key};
-use super::tile::TILE;
 use super::tile_tree::TileTree;
 use crate::kernels::Kernels;
 use crate::kernels::lanes::PackedParticle;
@@ -33,7 +32,7 @@ use nearest::{Feature, Nearest};
 use surface::{Found, Surface, View};
 use touching::{TouchWork, Touching};
 pub(super) use triangle_tiles::SurfaceSearch;
-use triangle_tiles::{TriangleTiles, Wanted};
+use triangle_tiles::{AtLoad, TriangleTiles, Wanted};
 
 /// Largest number of triangles that a particle never touches, on average. Further ones touch it as all others.
 const NEVER_PER_PARTICLE: usize = 128;
@@ -48,6 +47,8 @@ pub(super) struct SurfaceContacts {
     tiles: TriangleTiles,
     /// Slots and triangles that are near each other at load.
     load_pairs: LoadPairs,
+    /// Slots and the triangles at an edge of one that they never touch.
+    rims: PairMasks,
     /// Particles and triangles that may be near, and the parts of the triangles that are.
     in_reach: Vec<[u32; 2]>,
     features: Vec<Option<Feature>>,
@@ -86,10 +87,12 @@ impl SurfaceContacts {
             kernels,
         };
         let load_pairs = near_at_load(model, &surface, &mut tiles, (&search, thickness));
+        let rims = rims(&surface, &load_pairs, particles.len());
         Self {
             surface,
             tiles,
             load_pairs,
+            rims,
             in_reach: Vec::with_capacity(IN_REACH_MAX),
             features: Vec::with_capacity(IN_REACH_MAX),
             candidate_count_max,
@@ -128,7 +131,9 @@ impl SurfaceContacts {
     pub(super) fn find(&mut self, search: &SurfaceSearch<'_>) -> Search {
         self.tiles.refit(&self.surface, search);
         self.keep_candidates(search);
-        let Self { surface, tiles, load_pairs, in_reach, features, candidates, newest, .. } = self;
+        let Self {
+            surface, tiles, load_pairs, rims, in_reach, features, candidates, newest, ..
+        } = self;
         let (surface, load_pairs) = (&*surface, &*load_pairs);
         let mut adding = Adding {
             surface,
@@ -139,9 +144,10 @@ impl SurfaceContacts {
             newest,
             count_max: self.candidate_count_max,
         };
-        let except = |tiles| load_pairs.untouchable(tiles);
+        let at_load =
+            |tiles| AtLoad { never: load_pairs.untouchable(tiles), rim: rims.of_tiles(tiles) };
         let wanted = Wanted::Nearest;
-        let mut found = tiles.search((surface, wanted), search, &except, &mut |pair| {
+        let mut found = tiles.search((surface, wanted), search, &at_load, &mut |pair| {
             in_reach.push(pair);
             let has_room = in_reach.len() < IN_REACH_MAX;
             if has_room { Search::Continue(()) } else { adding.add(in_reach) }
@@ -169,14 +175,13 @@ impl SurfaceContacts {
                 continue;
             }
             let view = View { particles: search.states, slot, time: 0.0 };
-            let Found { triangle, nearest, .. } = surface.descend(candidate.triangle, view);
+            let Found { triangle, nearest, .. } =
+                surface.descend(candidate.triangle, (view, load_pairs));
             let is_known = has_candidate(candidates, newest[slot as usize], |known| {
                 surface.shares(triangle, nearest.feature, known)
             });
             if !is_known {
-                let never_touches = load_pairs.never_touch(slot, triangle);
-                let kept = Candidate { triangle, never_touches, ..*candidate };
-                add_candidate(candidates, newest, kept);
+                add_candidate(candidates, newest, Candidate { triangle, ..*candidate });
             }
         }
     }
@@ -213,7 +218,7 @@ impl Adding<'_> {
     /// Adds those of the pairs that come near each other, and empties the list. Breaks if there are too many candidates.
     fn add(&mut self, pairs: &mut Vec<[u32; 2]>) -> Search {
         let Self { surface, load_pairs, search, features, candidates, newest, count_max } = self;
-        search.kernels.run(NearbyWork { surface, search, pairs, features });
+        search.kernels.run(NearbyWork { surface, load_pairs, search, pairs, features });
         for ([slot, triangle], feature) in pairs.drain(..).zip(features.iter()) {
             let Some(feature) = *feature else { continue };
             // Triangles that share the nearest point are one candidate.
@@ -232,7 +237,7 @@ impl Adding<'_> {
             let first = surface.corners[triangle as usize][0];
             let [a, b] = [slot, first].map(|slot| search.particles[slot as usize]);
             let key = order_key(a, b);
-            let candidate = Candidate { slot, triangle, previous: None, key, never_touches: false };
+            let candidate = Candidate { slot, triangle, previous: None, key };
             add_candidate(candidates, newest, candidate);
         }
         Search::Continue(())
@@ -257,26 +262,38 @@ fn near_at_load(
     let count_max = NEVER_PER_PARTICLE * particles.len();
     let (mut never, mut closer) = (Vec::new(), Vec::new());
     tiles.refit(surface, search);
-    let _is_complete = tiles.search((surface, Wanted::All), search, &|_| [0; TILE], &mut |pair| {
-        let [slot, triangle] = pair;
-        let corners = surface.place(triangle, View { particles: states, slot, time: 0.0 });
-        let apart = Nearest::new(corners).mean(corners).length();
-        let is_of_body = body(slot) == body(surface.corners[triangle as usize][0]);
-        if (is_of_body && apart < distance) || apart == 0.0 {
-            never.push(pair);
-        } else if apart < thickness {
-            closer.push((pair, apart));
-        }
-        let is_full = never.len() + closer.len() >= count_max;
-        if is_full { Search::Break(()) } else { Search::Continue(()) }
-    });
+    let _is_complete =
+        tiles.search((surface, Wanted::All), search, &|_| AtLoad::default(), &mut |pair| {
+            let [slot, triangle] = pair;
+            let corners = surface.place(triangle, View { particles: states, slot, time: 0.0 });
+            let apart = Nearest::new(corners).mean(corners).length();
+            let is_of_body = body(slot) == body(surface.corners[triangle as usize][0]);
+            if (is_of_body && apart < distance) || apart == 0.0 {
+                never.push(pair);
+            } else if apart < thickness {
+                closer.push((pair, apart));
+            }
+            let is_full = never.len() + closer.len() >= count_max;
+            if is_full { Search::Break(()) } else { Search::Continue(()) }
+        });
     LoadPairs::from_pairs(never, closer, particles.len())
+}
+
+/// Returns, for each slot, the triangles that it may touch and that have an edge with one that it never touches.
+fn rims(surface: &Surface, load_pairs: &LoadPairs, slot_count: usize) -> PairMasks {
+    let pairs = load_pairs.never().flat_map(|[slot, triangle]| {
+        let neighbors = (0..3).filter_map(move |edge| surface.neighbor(triangle, edge));
+        let touched = neighbors.filter(move |one| !load_pairs.never_touch(slot, one.triangle));
+        touched.map(move |one| [slot, one.triangle])
+    });
+    PairMasks::new(pairs.collect(), slot_count)
 }
 
 #[cfg(test)]
 mod tests {
     //! Searches for strays against searches for all.
     use super::super::REACH;
+    use super::super::tile::TILE;
     use super::samples::{Random, sheet};
     use super::*;
 
@@ -306,6 +323,62 @@ mod tests {
         let kernels = Kernels::Reference;
         let distance = 1.4 * SPACING;
         SurfaceSearch { tree, states, particles, begins_paths, passed, span, distance, kernels }
+    }
+
+    /// Returns the particles and triangles with a local minimum of the distance among the triangles that a particle
+    /// may touch, at most REACH contact distances away.
+    fn minima<'a>(
+        contacts: &'a SurfaceContacts,
+        states: &'a [PackedParticle],
+    ) -> impl Iterator<Item = (u32, u32, Feature)> + 'a {
+        let SurfaceContacts { surface, load_pairs, .. } = contacts;
+        let pairs = (0..).zip(states).flat_map(|(slot, _)| {
+            let triangles = (0..).zip(&surface.corners);
+            triangles.map(move |(triangle, _)| (slot, triangle))
+        });
+        pairs.filter_map(move |(slot, triangle)| {
+            let view = View { particles: states, slot, time: 0.0 };
+            let corners = surface.place(triangle, view);
+            let nearest = Nearest::new(corners);
+            let is_near = nearest.mean(corners).length() < REACH * SPACING;
+            let may_touch = is_near
+                && !surface.has_corner(triangle, slot)
+                && !load_pairs.never_touch(slot, triangle);
+            let is_minimum =
+                may_touch && surface.nearer(triangle, &nearest, (view, load_pairs)).is_none();
+            is_minimum.then_some((slot, triangle, nearest.feature))
+        })
+    }
+
+    #[test]
+    fn a_search_finds_the_nearest_points_also_beside_triangles_that_never_touch() {
+        let model = sheet(SIDE, SPACING);
+        let particles = load::slots(&model);
+        let kernels = Kernels::Reference;
+        let (mut found_count, mut on_rim_count, mut missed) = (0, 0, 0);
+        for seed in 0..4 {
+            let mut random = Random(seed);
+            let states: Vec<_> = particles.iter().map(|one| rolled(*one, &mut random)).collect();
+            let mut tree = TileTree::new(particles.len());
+            tree.begin_paths(&states, kernels);
+            tree.refit([0.0, SPAN], kernels);
+            let room = 8 * particles.len();
+            let mut contacts = SurfaceContacts::new(&model, &particles, (SPACING, kernels), room);
+            let all = search(&tree, (&states, &particles), (true, 0.0, SPAN));
+            assert!(contacts.find(&all).is_continue());
+            for (slot, triangle, feature) in minima(&contacts, &states) {
+                let newest = contacts.newest[slot as usize];
+                let is_known = has_candidate(&contacts.candidates, newest, |known| {
+                    contacts.surface.shares(triangle, feature, known)
+                });
+                let is_on_rim = contacts.rims.has(slot, triangle);
+                on_rim_count += usize::from(is_on_rim && feature != Feature::Face);
+                found_count += 1;
+                missed += usize::from(!is_known);
+            }
+        }
+        assert!(found_count > 1_000 && on_rim_count > 20, "{found_count}, {on_rim_count}");
+        assert_eq!(missed, 0, "of {found_count}");
     }
 
     #[test]

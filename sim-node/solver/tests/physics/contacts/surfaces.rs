@@ -1,6 +1,6 @@
 //! Particles that touch triangles: the laws of friction, cloths that fold, and torn cloths.
 
-use sim_solver::{ParameterValue, Particle, Scene, Solver};
+use sim_solver::{ParameterValue, Particle, Scene, Solver, builtin};
 
 use super::super::{assert_at_most, assert_near, rates, solver, step, stepped};
 use super::cloths::{
@@ -77,6 +77,19 @@ fn folding_cloths_do_not_pass_through_themselves() {
     assert_holds("heap, one substep", [240, 1], 1.0, &heap(40));
     assert_holds("heap, half of the spacing", [240, 4], 0.5, &heap(40));
     assert_holds("heap, long steps, half of the spacing", [60, 16], 0.5, &heap(40));
+}
+
+#[test]
+fn a_sharp_fold_does_not_pass_through_the_triangles_that_its_particles_never_touch() {
+    let particles = builtin::text("covered-bust").unwrap();
+    let surfaces = particles.replace("mode = \"particles\"", "mode = \"surfaces\"");
+    let text = surfaces.replace("substeps = 6", "substeps = 16");
+    assert_ne!(text, surfaces);
+    let mut cloth = Solver::new(&Scene::from_toml(&text, "test").unwrap());
+    for _ in 0..20 {
+        step(&mut cloth, 6);
+        assert_eq!(crossings(&cloth), 0, "{}", cloth.scene_step());
+    }
 }
 
 #[test]

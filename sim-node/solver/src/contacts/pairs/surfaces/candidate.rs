@@ -9,8 +9,6 @@ pub(super) struct Candidate {
     /// The candidate of this particle that was found before.
     pub(super) previous: Option<u32>,
     pub(super) key: u8,
-    /// True if the particle has come to a triangle that it never touches.
-    pub(super) never_touches: bool,
 }
 
 /// Adds a candidate, and links it to the one of its particle that was added before.
@@ -27,7 +25,6 @@ pub(super) fn add_candidate(
 }
 
 /// True if a particle, whose newest candidate is given, has a candidate on a triangle that fulfils a condition.
-/// Triangles that it never touches do not count.
 pub(super) fn has_candidate(
     candidates: &[Candidate],
     newest: Option<u32>,
@@ -35,7 +32,7 @@ pub(super) fn has_candidate(
 ) -> bool {
     let mut at = newest;
     while let Some(candidate) = at.map(|index| &candidates[index as usize]) {
-        if !candidate.never_touches && condition(candidate.triangle) {
+        if condition(candidate.triangle) {
             return true;
         }
         at = candidate.previous;

@@ -1,16 +1,21 @@
 //! Tells which triangles in reach have a point that is nearest to a particle and comes near it.
 
+use super::super::load::LoadPairs;
 use super::faces::{Corners, mean, nearest_on_faces};
-use super::nearest::{Feature, Nearest};
+use super::nearest::{Feature, Nearest, clamped, next};
 use super::surface::{Surface, View};
 use super::triangle_tiles::SurfaceSearch;
 use crate::kernels::lanes::{LaneWork, PackedParticle, Wide};
-use crate::kernels::vectors::dot;
+use crate::kernels::vectors::{difference, dot, scaled, sum};
+
+/// Share of a distance that exceeds its rounding.
+const ROUNDING: f32 = 1e-4;
 
 /// Finds, for each particle and triangle in `pairs`, the part of the triangle with the nearest point, if that is a local
 /// minimum of the distance and comes near the particle.
 pub(super) struct NearbyWork<'a> {
     pub(super) surface: &'a Surface,
+    pub(super) load_pairs: &'a LoadPairs,
     pub(super) search: &'a SurfaceSearch<'a>,
     pub(super) pairs: &'a [[u32; 2]],
     pub(super) features: &'a mut Vec<Option<Feature>>,
@@ -21,63 +26,93 @@ impl LaneWork for NearbyWork<'_> {
 
     #[inline(always)]
     fn run<W: Wide>(self) {
-        let Self { surface, search, pairs, features } = self;
+        let Self { surface, load_pairs, search, pairs, features } = self;
         features.clear();
         let (groups, rest) = pairs.as_chunks::<8>();
         for pairs in groups {
-            let (on_face, near) = near_faces::<W>(surface, search, pairs);
+            let NearLanes { on_face, near } = near_lanes::<W>(surface, search, pairs);
             for (lane, pair) in pairs.iter().enumerate() {
-                features.push(if on_face & (1 << lane) == 0 {
-                    nearby(surface, search, *pair)
+                features.push(if near & (1 << lane) == 0 {
+                    None
+                } else if on_face & (1 << lane) == 0 {
+                    nearby((surface, load_pairs), search, *pair)
                 } else {
-                    let is_near = near & (1 << lane) != 0;
-                    (is_near && can_touch(surface, search.states, *pair)).then_some(Feature::Face)
+                    can_touch(surface, search.states, *pair).then_some(Feature::Face)
                 });
             }
         }
-        features.extend(rest.iter().map(|pair| nearby(surface, search, *pair)));
+        features.extend(rest.iter().map(|pair| nearby((surface, load_pairs), search, *pair)));
     }
 }
 
-/// Returns a bit for each particle whose nearest point is on the face of its triangle, and one for each that comes near
-/// this point.
+/// A bit for each of eight particles and their triangles.
+struct NearLanes {
+    /// The nearest point is on the face.
+    on_face: u32,
+    /// The particle comes near this point. Beside the face, it may do so.
+    near: u32,
+}
+
 #[inline(always)]
-fn near_faces<W: Wide>(
+fn near_lanes<W: Wide>(
     surface: &Surface,
     search: &SurfaceSearch<'_>,
     pairs: &[[u32; 2]; 8],
-) -> (u32, u32) {
+) -> NearLanes {
     let (mut slots, mut triangles) = ([0; 8], [0; 8]);
     for (lane, [slot, triangle]) in pairs.iter().enumerate() {
         (slots[lane], triangles[lane]) = (*slot, *triangle);
     }
-    let Corners { starts, ends } =
-        Corners::<W>::new(surface, search.states, (slots, triangles), search.span);
-    let (on_face, weights) = nearest_on_faces(starts);
-    let (point, later) = (mean(weights, starts), mean(weights, ends));
+    let corners = Corners::<W>::new(surface, search.states, (slots, triangles), search.span);
+    let (on_face, weights) = nearest_on_faces(corners.starts);
+    let (point, later) = (mean(weights, corners.starts), mean(weights, corners.ends));
     let length = dot(point, point).sqrt();
     // The distance along the direction in which they are apart now.
     let at_end = dot(point, later) / length;
     let distance = W::splat(search.distance);
-    (on_face, W::bits(length.is_below(distance)) | W::bits(at_end.is_below(distance)))
+    let near = W::bits(length.is_below(distance)) | W::bits(at_end.is_below(distance));
+    let beside_near = if on_face == 0xff { 0 } else { edges_near(&corners, search.distance) };
+    NearLanes { on_face, near: near & on_face | beside_near & !on_face }
+}
+
+/// Returns a bit for each triangle with an edge that a particle may come nearer to than `distance`: no point of it
+/// approaches by more than the longest path of a corner.
+#[inline(always)]
+fn edges_near<W: Wide>(Corners { starts, ends }: &Corners<W>, distance: f32) -> u32 {
+    let (mut nearest, mut longest) = (W::splat(f32::INFINITY), W::splat(0.0));
+    for corner in 0..3 {
+        let (from, to) = (starts[corner], starts[next(corner)]);
+        let along = difference(to, from);
+        let share = clamped(-dot(from, along) / dot(along, along));
+        let point = sum(from, scaled(along, share));
+        let square = dot(point, point);
+        nearest = W::select(square.is_below(nearest), square, nearest);
+        let path = difference(ends[corner], from);
+        longest = longest.max_or_rhs(dot(path, path));
+    }
+    let reach = (W::splat(distance) + longest.sqrt()) * W::splat(1.0 + ROUNDING);
+    W::bits(nearest.is_below(reach * reach))
 }
 
 /// Finds the part of one triangle. It has no lanes, so it is not compiled into the loop over them.
 #[inline(never)]
-fn nearby(surface: &Surface, search: &SurfaceSearch<'_>, pair: [u32; 2]) -> Option<Feature> {
+fn nearby(
+    (surface, load_pairs): (&Surface, &LoadPairs),
+    search: &SurfaceSearch<'_>,
+    pair: [u32; 2],
+) -> Option<Feature> {
     let SurfaceSearch { states, span, distance, .. } = *search;
     let [slot, triangle] = pair;
     let view = View { particles: states, slot, time: 0.0 };
     let corners = surface.place(triangle, view);
     let nearest = Nearest::new(corners);
-    if !can_touch(surface, states, pair) || surface.nearer(triangle, &nearest, view).is_some() {
-        return None;
-    }
     let later = surface.place(triangle, View { time: span, ..view });
     let (point, later) = (nearest.mean(corners), nearest.mean(later));
     let length = point.dot(point).sqrt();
     let is_near = length < distance || point.dot(later) / length < distance;
-    is_near.then_some(nearest.feature)
+    let is_minimum = || surface.nearer(triangle, &nearest, (view, load_pairs)).is_none();
+    let is_found = is_near && can_touch(surface, states, pair) && is_minimum();
+    is_found.then_some(nearest.feature)
 }
 
 /// True if a particle is no corner of a triangle, which is whole, and one of them is free.
@@ -100,6 +135,8 @@ mod tests {
     fn eight_triangles_at_once_are_near_as_one_after_the_other() {
         let (surface, particles) = surface_of(&sheet(4, 0.5));
         let (mut random, tree) = (Random(1), TileTree::new(16));
+        let never = (0..16).map(|slot| [slot, (5 * slot) % 18]).collect();
+        let load_pairs = LoadPairs::from_pairs(never, Vec::new(), 16);
         let mut face_count = 0;
         for _ in 0..200 {
             let states = [0; 16].map(|_| PackedParticle([0; 8].map(|_| random.number())));
@@ -116,11 +153,18 @@ mod tests {
                     distance: 0.8,
                     kernels,
                 };
-                let (surface, search) = (&surface, &search);
-                let mut features = Vec::new();
-                kernels.run(NearbyWork { surface, search, pairs: &pairs, features: &mut features });
+                let (surface, load_pairs, search) = (&surface, &load_pairs, &search);
+                let (pairs, mut features) = (&pairs, Vec::new());
+                let features_to = &mut features;
+                kernels.run(NearbyWork {
+                    surface,
+                    load_pairs,
+                    search,
+                    pairs,
+                    features: features_to,
+                });
                 let expected: Vec<_> =
-                    pairs.iter().map(|pair| nearby(surface, search, *pair)).collect();
+                    pairs.iter().map(|pair| nearby((surface, load_pairs), search, *pair)).collect();
                 assert_eq!(features, expected, "{kernels:?}");
                 face_count += features.iter().filter(|one| **one == Some(Feature::Face)).count();
             }

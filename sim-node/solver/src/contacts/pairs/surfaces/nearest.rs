@@ -84,6 +84,14 @@ impl Nearest {
     }
 }
 
+/// A share of the way along an edge, within 0..=1. 1 for NaN, which edges without a length have.
+#[inline(always)]
+pub(super) fn clamped<L: Lanes>(share: L) -> L {
+    let (zero, one) = (L::splat(0.0), L::splat(1.0));
+    let share = L::select(share.is_below(one), share, one);
+    L::select(zero.is_below(share), share, zero)
+}
+
 /// The corner behind a corner.
 pub(super) fn next(corner: usize) -> usize {
     if corner == 2 { 0 } else { corner + 1 }

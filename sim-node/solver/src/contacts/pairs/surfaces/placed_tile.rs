@@ -1,11 +1,11 @@
 //! The triangles of a tile where they are now, to tell which have a point nearest to a particle.
 
 use super::super::tile::{TILE, TileColumn};
-use super::nearest::{SIDE_TOLERANCE, inwards, next};
+use super::nearest::{SIDE_TOLERANCE, clamped, inwards, next};
 use super::surface::Surface;
 use super::triangle_tile::gather;
-use crate::kernels::lanes::{PackedParticle, Wide};
-use crate::kernels::vectors::{difference, dot};
+use crate::kernels::lanes::{PackedParticle, Wide, axes};
+use crate::kernels::vectors::{difference, dot, scaled, sum};
 
 /// A vector for each triangle of a tile, by axis.
 type TileVectors = [TileColumn; 3];
@@ -16,6 +16,17 @@ pub(super) struct PlacedTile {
     is_placed: bool,
     /// By edge, from each corner to the next.
     edges: [Edges; 3],
+    /// Mean displacements of the corners.
+    displacements: TileVectors,
+    /// Largest differences of the displacement of a corner from the mean.
+    spreads: TileColumn,
+}
+
+/// A particle on its path.
+#[derive(Clone, Copy)]
+pub(super) struct Moving {
+    pub(super) position: [f32; 3],
+    pub(super) displacement: [f32; 3],
 }
 
 /// One edge of each triangle.
@@ -23,6 +34,10 @@ pub(super) struct PlacedTile {
 struct Edges {
     /// The corner at which it starts.
     from: TileVectors,
+    /// Vector to the corner at which it ends.
+    along: TileVectors,
+    /// 1 over its squared length.
+    inverse_square: TileColumn,
     /// Vector across the edge, in the plane of the triangle, to its inside.
     inwards: TileVectors,
     /// The same of the other triangle at the edge. 0 at a border.
@@ -58,17 +73,28 @@ impl PlacedTile {
             let slots = &surface.corners[triangles.clone()];
             let opposites = &surface.opposites[triangles];
             // In a closure, the loads would be compiled for the baseline processor.
-            let corners = [
-                positions::<W>(states, slots.iter().map(|slots| slots[0])),
-                positions::<W>(states, slots.iter().map(|slots| slots[1])),
-                positions::<W>(states, slots.iter().map(|slots| slots[2])),
+            let [[a, a_moved], [b, b_moved], [c, c_moved]] = [
+                paths::<W>(states, slots.iter().map(|slots| slots[0])),
+                paths::<W>(states, slots.iter().map(|slots| slots[1])),
+                paths::<W>(states, slots.iter().map(|slots| slots[2])),
             ];
+            self.set_displacements(group, [a_moved, b_moved, c_moved]);
+            let corners = [a, b, c];
             for (edge, edges) in self.edges.iter_mut().enumerate() {
-                let opposite = positions(states, opposites.iter().map(|slots| slots[edge]));
+                let [opposite, _] = paths(states, opposites.iter().map(|slots| slots[edge]));
                 let ends = [corners[edge], corners[next(edge)]];
                 edges.set(group, ends, corners[next(next(edge))], opposite);
             }
         }
+    }
+
+    #[inline(always)]
+    fn set_displacements<W: Wide>(&mut self, group: usize, [a, b, c]: [[W; 3]; 3]) {
+        let mean = scaled(sum(sum(a, b), c), W::splat(1.0 / 3.0));
+        let [a, b, c] = [difference(a, mean), difference(b, mean), difference(c, mean)];
+        let square = dot(a, a).max_or_rhs(dot(b, b)).max_or_rhs(dot(c, c));
+        square.sqrt().store(&mut self.spreads[group], 0);
+        set(&mut self.displacements, group, mean);
     }
 
     /// Returns those of the triangles in `lanes` whose nearest point to a particle may be a local minimum of the
@@ -92,6 +118,33 @@ impl PlacedTile {
         }
         bits & lanes
     }
+
+    /// Returns those of the triangles in `lanes` with an edge that a particle may come nearer to than a distance within
+    /// a number of displacements.
+    #[inline(always)]
+    pub(super) fn lanes_with_edges_near<W: Wide>(
+        &self,
+        lanes: u32,
+        Moving { position, displacement }: Moving,
+        (distance, span): (f32, f32),
+    ) -> u32 {
+        let mut bits = 0;
+        for group in 0..TILE / 8 {
+            if (lanes >> (8 * group)) & 0xff != 0 {
+                let [a, b, c] = &self.edges;
+                let relative = axes(|axis| {
+                    W::splat(displacement[axis]) - W::load(&self.displacements[axis][group], 0)
+                });
+                let speed = dot(relative, relative).sqrt() + W::load(&self.spreads[group], 0);
+                let reach = W::splat(distance) + W::splat(span) * speed;
+                let a = a.lanes_near(group, position, reach);
+                let b = b.lanes_near(group, position, reach);
+                let c = c.lanes_near(group, position, reach);
+                bits |= (a | b | c) << (8 * group);
+            }
+        }
+        bits & lanes
+    }
 }
 
 /// The triangles of a group of lanes that a particle is beside.
@@ -110,10 +163,22 @@ impl Edges {
         let edge = difference(ends[1], ends[0]);
         let square = dot(edge, edge);
         set(&mut self.from, group, ends[0]);
+        set(&mut self.along, group, edge);
+        (W::splat(1.0) / square).store(&mut self.inverse_square[group], 0);
         set(&mut self.inwards, group, inwards(ends, corner));
         set(&mut self.neighbor_inwards, group, inwards(ends, opposite));
         let tolerance = W::splat(SIDE_TOLERANCE) * square * square;
         tolerance.store(&mut self.tolerance[group], 0);
+    }
+
+    /// Returns a bit for each edge that is nearer to a particle than `reach`.
+    #[inline(always)]
+    fn lanes_near<W: Wide>(&self, group: usize, point: [f32; 3], reach: W) -> u32 {
+        let along = axes(|axis| W::load(&self.along[axis][group], 0));
+        let arm = axes(|axis| W::splat(point[axis]) - W::load(&self.from[axis][group], 0));
+        let share = dot(arm, along) * W::load(&self.inverse_square[group], 0);
+        let apart = difference(arm, scaled(along, clamped(share)));
+        W::bits(dot(apart, apart).is_below(reach * reach))
     }
 
     #[inline(always)]
@@ -137,9 +202,9 @@ fn set<W: Wide>(vectors: &mut TileVectors, group: usize, vector: [W; 3]) {
     }
 }
 
-/// Where eight particles are.
+/// The positions and displacements of eight particles.
 #[inline(always)]
-fn positions<W: Wide>(states: &[PackedParticle], slots: impl Iterator<Item = u32>) -> [W; 3] {
-    let [[x, y, z, _], _] = W::columns(&gather(states, slots));
-    [x, y, z]
+fn paths<W: Wide>(states: &[PackedParticle], slots: impl Iterator<Item = u32>) -> [[W; 3]; 2] {
+    let [[x, y, z, _], [dx, dy, dz, _]] = W::columns(&gather(states, slots));
+    [[x, y, z], [dx, dy, dz]]
 }

@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use super::super::load::LoadPairs;
 use super::nearest::{Feature, Nearest, SIDE_TOLERANCE, is_on_side_of, next};
 use crate::kernels::lanes::PackedParticle;
 use crate::scene::model::Model;
@@ -150,25 +151,34 @@ impl Surface {
     }
 
     /// Returns a triangle around the nearest point of this one that leads nearer to the viewer, or `None` if the
-    /// point is a local minimum of the distance.
-    pub(super) fn nearer(&self, triangle: u32, nearest: &Nearest, view: View<'_>) -> Option<u32> {
+    /// point is a local minimum of the distance. Triangles that the viewer never touches do not count: where
+    /// the cloth folds, the nearest point is often on one of them, and then a point on their rim must hold the layers apart.
+    pub(super) fn nearer(
+        &self,
+        triangle: u32,
+        nearest: &Nearest,
+        (view, load_pairs): (View<'_>, &LoadPairs),
+    ) -> Option<u32> {
+        let may_touch = |triangle: u32| !load_pairs.never_touch(view.slot, triangle);
         let corners = self.corners[triangle as usize];
         match nearest.feature {
             Feature::Face => None,
             Feature::Edge(edge) => {
                 let neighbor = self.neighbor(triangle, edge)?;
                 let ends = [corners[edge], corners[next(edge)]].map(|slot| view.at(slot));
-                is_on_side_of(ends, view.at(neighbor.opposite)).then_some(neighbor.triangle)
+                let is_nearer = is_on_side_of(ends, view.at(neighbor.opposite));
+                Some(neighbor.triangle).filter(|other| is_nearer && may_touch(*other))
             }
             Feature::Corner(corner) => {
                 let slot = corners[corner];
                 let at = view.at(slot);
                 self.fan(slot).find(|triangle| {
                     let others = self.corners[*triangle as usize].into_iter();
-                    others.filter(|other| *other != slot).any(|other| {
+                    let is_nearer = others.filter(|other| *other != slot).any(|other| {
                         let edge = view.at(other) - at;
                         -edge.dot(at) > SIDE_TOLERANCE * edge.dot(edge)
-                    })
+                    });
+                    is_nearer && may_touch(*triangle)
                 })
             }
         }
@@ -211,12 +221,17 @@ impl Surface {
     }
 
     /// Goes from a triangle to the one that is nearest to the viewer, across edges and around corners, as long as each is
-    /// nearer than the one before.
+    /// nearer than the one before, and not one that the viewer never touches.
     #[inline(always)]
-    pub(super) fn descend(&self, triangle: u32, view: View<'_>) -> Found {
+    pub(super) fn descend(
+        &self,
+        triangle: u32,
+        (view, load_pairs): (View<'_>, &LoadPairs),
+    ) -> Found {
         let mut found = self.find(triangle, view);
         for _ in 0..CROSSINGS_MAX {
-            let Some(nearer) = self.nearer(found.triangle, &found.nearest, view) else { break };
+            let nearer = self.nearer(found.triangle, &found.nearest, (view, load_pairs));
+            let Some(nearer) = nearer else { break };
             found = self.find(nearer, view);
         }
         found

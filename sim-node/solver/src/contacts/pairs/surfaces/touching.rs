@@ -73,11 +73,8 @@ impl Touching<'_> {
     fn walk_to_contact(&self, candidate: &mut Candidate) -> Option<SurfaceContact> {
         let Candidate { slot, triangle, .. } = *candidate;
         let view = View { particles: self.states, slot, time: 1.0 };
-        let found = self.surface.descend(triangle, view);
-        if found.triangle != triangle {
-            candidate.triangle = found.triangle;
-            candidate.never_touches = self.load_pairs.never_touch(slot, found.triangle);
-        }
+        let found = self.surface.descend(triangle, (view, self.load_pairs));
+        candidate.triangle = found.triangle;
         self.contact(candidate, found.nearest.weights, separation(self.surface, &found, view))
     }
 
@@ -88,10 +85,10 @@ impl Touching<'_> {
         weights: [f32; 3],
         (normal, height): (Vec3, f32),
     ) -> Option<SurfaceContact> {
-        let Candidate { slot, triangle, never_touches, .. } = *candidate;
+        let Candidate { slot, triangle, .. } = *candidate;
         let distance = self.load_pairs.distance([slot, triangle], self.thickness);
         // False for NaN.
-        let is_near = height < self.reach * distance && !never_touches;
+        let is_near = height < self.reach * distance;
         let [a, b, c] = self.surface.corners[triangle as usize];
         let slots = [slot, a, b, c];
         is_near.then_some(SurfaceContact { slots, weights, normal, distance })

@@ -1,11 +1,12 @@
 //! Tiles of triangles, to find those that particles come near.
 
 use super::super::box_tree::{BoxTree, Search};
+use super::super::load::LaneMasks;
 use super::super::tile::{
     TILE, TILE_LENGTH, coordinates, lanes_in_box, mark_all, members, take_lowest,
 };
 use super::super::tile_tree::TileTree;
-use super::placed_tile::PlacedTile;
+use super::placed_tile::{Moving, PlacedTile};
 use super::surface::Surface;
 use super::triangle_tile::TriangleTile;
 use crate::contacts::bounds::Bounds;
@@ -67,13 +68,13 @@ impl TriangleTiles {
     }
 
     /// Passes every particle and triangle to `accept` that may come nearer than the distance of the search, if there is a
-    /// stray among the particle and the corners of the triangle. `except` has, for a tile of particles and one of
-    /// triangles, a bit for each triangle that a particle leaves out.
+    /// stray among the particle and the corners of the triangle. `at_load` has what a tile of particles and one of
+    /// triangles were at load.
     pub(super) fn search(
         &mut self,
         (surface, wanted): (&Surface, Wanted),
         search: &SurfaceSearch<'_>,
-        except: &impl Fn([u32; 2]) -> [u16; TILE],
+        at_load: &impl Fn([u32; 2]) -> AtLoad,
         accept: &mut impl FnMut([u32; 2]) -> Search,
     ) -> Search {
         let Self { tiles, boxes, strays, placed, tile_pairs } = self;
@@ -89,7 +90,7 @@ impl TriangleTiles {
                 search,
                 surface,
                 wanted,
-                except,
+                at_load,
                 accept,
             };
             let found = search.kernels.run(work);
@@ -117,6 +118,15 @@ pub(super) enum Wanted {
     All,
     /// Only those whose nearest point may be a local minimum of the distance.
     Nearest,
+}
+
+/// Bits of the triangles of a tile, for each particle of another one.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct AtLoad {
+    /// The triangles that a particle leaves out.
+    pub(super) never: LaneMasks,
+    /// Their neighbours, with points that can be nearest although a triangle that is left out is nearer.
+    pub(super) rim: LaneMasks,
 }
 
 /// Particles that come near triangles.
@@ -169,7 +179,7 @@ impl LaneWork for RefitWork<'_> {
 }
 
 /// Examines pairs of a tile of particles and a tile of triangles.
-struct SearchWork<'a, E, F> {
+struct SearchWork<'a, A, F> {
     tiles: &'a mut [TriangleTile],
     strays: &'a [u16],
     placed: &'a mut [PlacedTile],
@@ -177,18 +187,16 @@ struct SearchWork<'a, E, F> {
     search: &'a SurfaceSearch<'a>,
     surface: &'a Surface,
     wanted: Wanted,
-    except: &'a E,
+    at_load: &'a A,
     accept: &'a mut F,
 }
 
-impl<E: Fn([u32; 2]) -> [u16; TILE], F: FnMut([u32; 2]) -> Search> LaneWork
-    for SearchWork<'_, E, F>
-{
+impl<A: Fn([u32; 2]) -> AtLoad, F: FnMut([u32; 2]) -> Search> LaneWork for SearchWork<'_, A, F> {
     type Output = Search;
 
     #[inline(always)]
     fn run<W: Wide>(self) -> Search {
-        let Self { tiles, strays, placed, pairs, search, surface, wanted, except, accept } = self;
+        let Self { tiles, strays, placed, pairs, search, surface, wanted, at_load, accept } = self;
         let SurfaceSearch { tree, states, passed, span, distance, .. } = *search;
         let half = 0.5 * span;
         let middle_time = passed + half;
@@ -212,22 +220,26 @@ impl<E: Fn([u32; 2]) -> [u16; TILE], F: FnMut([u32; 2]) -> Search> LaneWork
             if lanes == 0 {
                 continue;
             }
-            let left_out = except([left, right]);
+            let AtLoad { never, rim } = at_load([left, right]);
             let spheres = triangles.grown::<W>(distance + half * dot(relative, relative).sqrt());
             let [x, y, z] = coordinates(&middles);
             while let Some(lane) = take_lowest(&mut lanes) {
                 let is_stray = stray_lanes & (1 << lane) != 0;
                 let (slot, lane) = (TILE_LENGTH * left + lane, lane as usize);
                 let wanted_lanes = if is_stray { ALL_LANES } else { stray_triangles };
-                let mut near = !u32::from(left_out[lane]) & wanted_lanes;
+                let mut near = !u32::from(never[lane]) & wanted_lanes;
                 if near != 0 {
                     near &= spheres.lanes_around([x[lane], y[lane], z[lane]]);
                 }
                 if near != 0 && wanted == Wanted::Nearest {
                     let placed = &mut placed[right as usize];
                     placed.place_if_clear::<W>(surface, first_triangle, states);
-                    let PackedParticle([x, y, z, ..]) = states[slot as usize];
-                    near = placed.lanes_nearest::<W>(near, [x, y, z]);
+                    let PackedParticle([x, y, z, _, dx, dy, dz, _]) = states[slot as usize];
+                    let position = [x, y, z];
+                    let moving = Moving { position, displacement: [dx, dy, dz] };
+                    let on_rim = near & u32::from(rim[lane]);
+                    near = placed.lanes_with_edges_near::<W>(on_rim, moving, (distance, span))
+                        | placed.lanes_nearest::<W>(near, position);
                 }
                 while let Some(other) = take_lowest(&mut near) {
                     accept([slot, first_triangle + other])?;
