@@ -6,7 +6,7 @@ use integration_tests::{Process, Program, Sandbox, ctl, record, wait_for};
 use recorder::{FrameReader, LogReader};
 
 use crate::picture::{ERROR_MAX, NAMED, SWINGING, errors};
-use crate::support::{Area, Button, ReplayRig, is_ghost};
+use crate::support::{Area, Button, ReplayRig, is_cloth, is_ghost};
 
 /// A view in which the swinging sheet stays within the picture.
 const VIEW: &str = "show.particles=1&camera=0.5,-0.35,0,3,0.42,0.16";
@@ -328,4 +328,40 @@ fn a_ghost_is_faint_behind_a_solid() {
     };
     assert!(pixels(1.0) > 10, "{} pixels beside the box", pixels(1.0));
     assert_eq!(pixels(0.0), 0, "behind the box");
+}
+
+#[test]
+#[ignore = "needs Chromium"]
+fn a_ghost_that_moves_leaves_the_sheet_where_its_own_recording_has_it() {
+    let sandbox = Sandbox::new();
+    let folder = sandbox.path("runs");
+    std::fs::create_dir(&folder).unwrap();
+    let blown = SWINGING.replace("gravity = [3, -9.81, 4]", "gravity = [-9, -9.81, -4]");
+    let file = |name: &str| format!("{folder}/{name}.mcap");
+    for (name, scene) in [("blown", blown.as_str()), ("shown", SWINGING)] {
+        let scene = sandbox.write(&format!("{name}.toml"), scene);
+        let args = ["simulate", &scene, "--steps", "120", "-o", &file(name)];
+        Process::run(Program::Recorder, &sandbox, &args).success();
+    }
+    let [own, others] = ["shown", "blown"].map(|name| recorded(&file(name)));
+
+    let replay = ReplayRig::open(sandbox, &folder, VIEW);
+    let tab = &replay.tab;
+    tab.wait("document.querySelector('#file').value === 'shown' && viewer.frame >= 0");
+    tab.evaluate("void (ghost => { ghost.value = 'blown'; ghost.dispatchEvent(new Event('change')); })(document.querySelector('#ghost'))");
+    for step in [60, 120] {
+        tab.evaluate(&format!("void (seek => {{ seek.value = {step}; seek.dispatchEvent(new Event('input')); }})(document.querySelector('#seek'))"));
+        tab.wait(&format!("viewer.paused && viewer.step === {step} && document.querySelector('#hud').textContent.includes('ghost up to')"));
+        // The picture of the frame, not a later one of the same state.
+        let (camera, picture) = (tab.camera(), tab.screenshot());
+        for error in errors(&picture, &camera, &own[step]) {
+            assert!(error <= ERROR_MAX, "step {step}: a particle is {error} px away");
+        }
+        let from_ghost = errors(&picture, &camera, &others[step]);
+        assert!(from_ghost.iter().any(|error| *error > ERROR_MAX), "the sheets coincide");
+        // The surface, at its lower right corner: the ghost has swung to the left.
+        let area = Area::around(camera.project(own[step][69]), 12.0);
+        let cloth = picture.count(&area, is_cloth);
+        assert!(cloth > 100, "step {step}: {cloth} px of the surface");
+    }
 }

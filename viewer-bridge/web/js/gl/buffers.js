@@ -151,6 +151,16 @@ export class SceneBuffers {
     points.grabbed.set(new Uint32Array(marks.filter(isGrabbed).flat()));
   }
 
+  /** Makes the next draws read these textures. */
+  bind() {
+    this.positions.bind();
+    this.fanRanges.bind();
+    this.fans.bind();
+    this.splits.bind();
+    this.speeds.bind();
+    this.flatPlaces?.bind();
+  }
+
   delete() {
     for (const texture of [this.positions, this.fanRanges, this.fans, this.splits, this.speeds, this.flatPlaces]) texture?.delete();
     this.ghost?.delete();

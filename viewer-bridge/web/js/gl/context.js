@@ -10,6 +10,8 @@ export const ROW = 1024;
 
 /** Texture units by the samplers of the shaders. */
 export const UNITS = Object.freeze({ u_positions: 0, u_fan_ranges: 1, u_fans: 2, u_splits: 3, u_flat_places: 4, u_shadow_map: 5, u_speeds: 6 });
+/** Unit for uploads. No shader reads it, so an upload never changes what a draw reads. */
+const UPLOAD_UNIT = Object.keys(UNITS).length;
 
 /**
  * Opens the WebGL2 context of a canvas; null if the browser has no WebGL2. The canvas is opaque, because
@@ -120,16 +122,16 @@ export const layouts = (gl) => ({
   u32x4: { internal: gl.RGBA32UI, format: gl.RGBA_INTEGER, type: gl.UNSIGNED_INT, width: 4 },
 });
 
-/** An array in a texture, `ROW` elements per row. Vertex shaders read it by index. */
+/** An array in a texture, `ROW` elements per row. Vertex shaders read it by index, from its unit, once it is bound. */
 export class ArrayTexture {
-  /** @param {GL} gl @param {number} unit texture unit that it stays bound to @param {Layout} layout @param {number} count elements */
+  /** @param {GL} gl @param {number} unit texture unit of its sampler @param {Layout} layout @param {number} count elements */
   constructor(gl, unit, layout, count) {
     this.gl = gl;
     this.unit = unit;
     this.layout = layout;
     this.count = count;
     this.handle = gl.createTexture();
-    this.bind();
+    this.bindTo(UPLOAD_UNIT);
     gl.texStorage2D(gl.TEXTURE_2D, 1, layout.internal, ROW, Math.max(1, Math.ceil(count / ROW)));
     for (const [parameter, value] of [
       [gl.TEXTURE_MIN_FILTER, gl.NEAREST], [gl.TEXTURE_MAG_FILTER, gl.NEAREST],
@@ -137,15 +139,21 @@ export class ArrayTexture {
     ]) gl.texParameteri(gl.TEXTURE_2D, parameter, value);
   }
 
+  /** Makes the next draws read it. */
   bind() {
-    this.gl.activeTexture(this.gl.TEXTURE0 + this.unit);
+    this.bindTo(this.unit);
+  }
+
+  /** @param {number} unit */
+  bindTo(unit) {
+    this.gl.activeTexture(this.gl.TEXTURE0 + unit);
     this.gl.bindTexture(this.gl.TEXTURE_2D, this.handle);
   }
 
   /** Uploads the elements in first..end, as whole rows.
    * @param {ArrayBufferView} array @param {number} [first] @param {number} [end] */
   write(array, first = 0, end = this.count) {
-    this.bind();
+    this.bindTo(UPLOAD_UNIT);
     this.gl.pixelStorei(this.gl.UNPACK_ALIGNMENT, 1);
     const firstRow = Math.floor(first / ROW);
     const fullRows = Math.floor(Math.min(end + ROW - 1, this.count) / ROW) - firstRow;

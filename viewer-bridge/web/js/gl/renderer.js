@@ -147,6 +147,8 @@ export class Renderer {
     if (gl.isContextLost()) return;
     this.resize();
     this.uploadOrSimplify();
+    // Each picture binds what it reads: the one before may have been of another scene.
+    this.buffers?.bind();
     this.uniforms.update();
     // Its texture is bound even if nothing casts a shadow.
     if (this.hasEffects()) this.shadowMap ??= new ShadowMap(gl);

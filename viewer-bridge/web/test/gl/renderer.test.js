@@ -1,9 +1,10 @@
-// The renderer keeps GPU resources for one scene only, however many were shown before. The context is
+// The renderer keeps GPU resources for one scene only, and each draw reads those of its own. The context is
 // a fake that counts created and deleted objects.
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { Camera } from "../../js/geometry/camera.js";
+import { UNITS } from "../../js/gl/context.js";
 import { Renderer } from "../../js/gl/renderer.js";
 import { facets } from "../../js/gl/solids.js";
 import { Simulation } from "../../js/state/simulation.js";
@@ -35,6 +36,18 @@ function countingContext() {
   return gl;
 }
 
+/** Lists the draws, each with the texture that the sampler of the positions reads. */
+function logDraws(gl) {
+  const drawn = [];
+  const bound = new Map();
+  let active = "";
+  gl.TEXTURE0 = 0;
+  gl.activeTexture = (unit) => { active = unit; };
+  gl.bindTexture = (_, texture) => bound.set(active, texture);
+  for (const call of ["drawElements", "drawArraysInstanced"]) gl[call] = () => drawn.push({ call, positions: bound.get(UNITS.u_positions) });
+  return drawn;
+}
+
 function rendererOf(simulation) {
   const gl = countingContext();
   const canvas = { clientWidth: 80, clientHeight: 60, getContext: () => gl };
@@ -52,6 +65,7 @@ const scene = (epoch) => ({
 const frame = (epoch, number, isQuantised) => ({
   kind: "frame", epoch, step: number, number, particleCount: 3, isQuantised, lo: [0, 0, 0], scale: [1, 1, 1],
   positions: isQuantised ? new Uint16Array(9) : new Float32Array(9), nonFinite: new Uint32Array(0),
+  bounds: { min: [0, 0, 0], max: [1, 1, 1] },
 });
 
 test("scenes of alternating formats use no more memory than the first two", () => {
@@ -68,6 +82,30 @@ test("scenes of alternating formats use no more memory than the first two", () =
   assert.equal(kept[1].Texture, 6);
   assert.equal(kept[1].bytes, kept[0].bytes, "the lists of the old scene are freed");
   assert.deepEqual(kept.slice(2), [kept[1], kept[1], kept[1], kept[1]]);
+});
+
+test("the surface and its shadows are drawn at the positions of their own recording while a ghost moves", () => {
+  for (const hasEffects of [true, false]) {
+    const simulation = new Simulation();
+    const { renderer, gl } = rendererOf(simulation);
+    renderer.toggles.effects = hasEffects;
+    const drawn = logDraws(gl);
+    simulation.receive(scene(1));
+    simulation.receive({ kind: "colliders", epoch: 1, step: 0, colliders: [{ index: 0, shape: "plane", normal: [0, 1, 0], offset: -1 }] });
+    for (const step of [1, 2, 3]) {
+      const positions = Float32Array.of(5, 5, 5, 6, 5, 5, 5, 6, 5);
+      simulation.receive({ kind: "ghost", epoch: 1, step, positions, hidden: new Uint32Array(0), farthest: 0, distance: 5 });
+      simulation.receive(frame(1, step, false));
+      drawn.length = 0;
+      renderer.draw();
+      const [own, others] = [renderer.buffers.positions.handle, renderer.buffers.ghost.positions.handle];
+      const surfaces = drawn.filter(({ call }) => call === "drawElements");
+      assert.ok(surfaces.length >= 2, "a surface and a shadow");
+      assert.ok(surfaces.every(({ positions }) => positions === own), `a surface of the ghost at step ${step}`);
+      // The ghost is drawn last, once behind the rest and once in front of it.
+      assert.ok(drawn.slice(-2).every(({ positions }) => positions === others));
+    }
+  }
 });
 
 test("a mesh is drawn at the pose of its collider, each triangle with its normal", () => {
