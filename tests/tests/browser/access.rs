@@ -25,6 +25,52 @@ fn a_phone_can_fit_the_view_and_hit_every_button() {
     assert_eq!(controls(&rig, "Math.min(box.width, box.height) < 24"), 0.0);
 }
 
+/// Shows every message over the picture at once, and returns the rectangles of the messages and of the stage.
+const MESSAGES: &str = "(() => {
+    const show = (id, text) => {
+        const one = document.querySelector(`#${id}`);
+        one.hidden = false;
+        if (text !== undefined) one.textContent = text;
+    };
+    show('recording');
+    show('recording-text', 'Recorded 0:06 · 1.9 MB · nothing lost');
+    show('recording-open');
+    show('video-line');
+    show('video-text', 'Video 0:04 · 2.1 MB');
+    show('question');
+    show('question-text', 'Others have changed the simulation since. Undo that too?');
+    show('question-yes', 'Undo all');
+    show('question-no', 'Keep');
+    show('banner', 'You are looking at an earlier state. The simulation went on: the present is 12.4 s later.');
+    for (const text of ['Undid the drag.', 'The node has kept only an earlier state, 0.3 s before the one on show.'])
+        document.querySelector('#notices').append(Object.assign(document.createElement('li'), { textContent: text }));
+    const rectangle = one => (({ left, top, right, bottom }) => [left, top, right, bottom])(one.getBoundingClientRect());
+    return ['#stage', '#recording', '#video-line', '#question', '#banner', '#notices li', '#notices li + li']
+        .map(one => rectangle(document.querySelector(one)));
+})()";
+
+#[test]
+#[ignore = "needs Chromium"]
+fn no_message_hides_another_one_in_a_small_window() {
+    for [width, height] in [[390, 780], [900, 600], [1600, 900]] {
+        let rig = Rig::new(&["curtain", "--paused"], "");
+        let window =
+            json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": false });
+        rig.tab.call("Emulation.setDeviceMetricsOverride", window);
+        rig.tab.wait(&format!("innerWidth === {width}"));
+        let rectangles: Vec<[f64; 4]> = serde_json::from_value(rig.tab.evaluate(MESSAGES)).unwrap();
+        let (stage, messages) = rectangles.split_first().unwrap();
+        for (index, one) in messages.iter().enumerate() {
+            let is_inside = one[0] >= stage[0] && one[2] <= stage[2] && one[3] <= stage[3];
+            assert!(is_inside && one[3] - one[1] > 20.0, "{width} px: {one:?} in {stage:?}");
+            for other in &messages[index + 1..] {
+                let is_apart = one[3] <= other[1] || one[2] <= other[0] || other[2] <= one[0];
+                assert!(is_apart, "{width} px: {one:?} and {other:?}");
+            }
+        }
+    }
+}
+
 #[test]
 #[ignore = "needs Chromium"]
 fn screen_readers_hear_values_and_no_plots_or_clocks() {
@@ -42,7 +88,7 @@ fn screen_readers_hear_values_and_no_plots_or_clocks() {
     let regions = "[...document.querySelectorAll('output, [aria-live], [role=status]')]        .filter(one => one.ariaLive !== 'off').map(one => one.id).join()";
     assert_eq!(
         rig.tab.evaluate(regions),
-        "banner,notices,recording-said,inspect-said,command-answer,plot-said,hashes"
+        "recording-said,banner,notices,inspect-said,command-answer,plot-said,hashes"
     );
     assert!(rig.tab.number("document.querySelectorAll('#plots output').length") > 3.0);
 }
