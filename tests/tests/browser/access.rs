@@ -64,7 +64,10 @@ fn no_message_hides_another_one_in_a_small_window() {
             let is_inside = one[0] >= stage[0] && one[2] <= stage[2] && one[3] <= stage[3];
             assert!(is_inside && one[3] - one[1] > 20.0, "{width} px: {one:?} in {stage:?}");
             for other in &messages[index + 1..] {
-                let is_apart = one[3] <= other[1] || one[2] <= other[0] || other[2] <= one[0];
+                let is_apart = one[3] <= other[1]
+                    || other[3] <= one[1]
+                    || one[2] <= other[0]
+                    || other[2] <= one[0];
                 assert!(is_apart, "{width} px: {one:?} and {other:?}");
             }
         }
@@ -88,7 +91,7 @@ fn screen_readers_hear_values_and_no_plots_or_clocks() {
     let regions = "[...document.querySelectorAll('output, [aria-live], [role=status]')]        .filter(one => one.ariaLive !== 'off').map(one => one.id).join()";
     assert_eq!(
         rig.tab.evaluate(regions),
-        "recording-said,banner,notices,inspect-said,command-answer,plot-said,hashes"
+        "banner,recording-said,notices,inspect-said,command-answer,plot-said,hashes"
     );
     assert!(rig.tab.number("document.querySelectorAll('#plots output').length") > 3.0);
 }
