@@ -5,6 +5,7 @@ use integration_tests::{DEADLINE, wait_for};
 use serde_json::json;
 use viewer_bridge::scene::catalog::Catalog;
 
+use crate::picture::SWINGING;
 use crate::support::{Button, Rig};
 
 /// Particle of the curtain in the middle of its hem.
@@ -74,6 +75,29 @@ fn every_scene_is_loaded_by_keys_and_from_the_menu_at_its_own_rate() {
     rig.tab.click(card);
     rig.tab.wait(&shown("ragdoll"));
     assert_eq!(rig.tab.evaluate("viewer.notices"), json!([]));
+}
+
+#[test]
+#[ignore = "needs Chromium"]
+fn the_menu_shows_a_plain_card_for_a_scene_from_a_file() {
+    let rig = Rig::with_scene_in_menu(&SWINGING.replace("version", "name = \"mine\"\nversion"));
+    rig.tab.key('m');
+    // A request for a picture would be an error of the page, and fail this test.
+    rig.tab.wait("document.querySelectorAll('#scenes .picture').length === document.querySelectorAll('#scenes button').length");
+    let card = "#scenes button[data-scene=mine]";
+    let plain = format!("{card} i.picture");
+    rig.tab.evaluate(&format!("document.querySelector('{card}').scrollIntoView()"));
+    rig.tab.wait(
+        "[...document.querySelectorAll('#scenes img')].every(one => one.naturalWidth === 320)",
+    );
+    let sizes = format!(
+        "['{plain}', '#scenes img'].map(one => document.querySelector(one).getBoundingClientRect())\
+         .map(({{ width, height }}) => [Math.round(width), Math.round(height)])"
+    );
+    let sizes = rig.tab.evaluate(&sizes);
+    assert_eq!(sizes[0], sizes[1]);
+    rig.tab.click(card);
+    rig.tab.wait("viewer.scene === 'mine' && viewer.frame >= 0");
 }
 
 #[test]

@@ -136,8 +136,8 @@ mod tests {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("web");
         for assets in [Assets::Embedded, Assets::folder(&folder).unwrap()] {
             for scene in Catalog::default().entries() {
-                let path = format!("pictures/{}.png", scene.name);
-                let answer = assets.answer(&path, &HeaderMap::new());
+                let path = scene.picture.as_deref().unwrap();
+                let answer = assets.answer(path, &HeaderMap::new());
                 assert_eq!(answer.status(), StatusCode::OK, "{path}");
                 assert_eq!(answer.headers()[header::CONTENT_TYPE], "image/png");
             }

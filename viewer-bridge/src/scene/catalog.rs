@@ -23,6 +23,9 @@ pub struct SceneEntry {
     pub dimensions: u32,
     /// Description in one line.
     pub text: String,
+    /// Path of its picture beside the page. Scenes from files have none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub picture: Option<String>,
 }
 
 /// The scenes that pages can load.
@@ -62,6 +65,7 @@ impl Catalog {
             rate_hz: scene.solver.rate_hz,
             dimensions: scene.dimensions,
             text: label,
+            picture: None,
         });
         self.paths.insert(name, text);
         Ok(())
@@ -90,5 +94,6 @@ fn built_in_entry(name: &str) -> SceneEntry {
         rate_hz: summary.rate_hz,
         dimensions: if summary.is_planar { 2 } else { 3 },
         text: builtin::summary(name).expect("a built-in scene has a description").to_owned(),
+        picture: Some(format!("pictures/{name}.png")),
     }
 }

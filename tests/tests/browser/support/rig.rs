@@ -34,22 +34,29 @@ impl Rig {
     /// Starts a node with `args`, a bridge, and a page. The scene is the first argument. `fragment` is
     /// the part of the address after "#".
     pub(crate) fn new(args: &[&str], fragment: &str) -> Self {
-        Self::within(Sandbox::new(), args, fragment)
+        Self::within(Sandbox::new(), args, &[], fragment)
     }
 
     /// Starts the programs with the text of a scene.
     pub(crate) fn with_scene(text: &str, args: &[&str], fragment: &str) -> Self {
         let sandbox = Sandbox::new();
         let file = sandbox.write("scene.toml", text);
-        Self::within(sandbox, &[&[file.as_str()], args].concat(), fragment)
+        Self::within(sandbox, &[&[file.as_str()], args].concat(), &[], fragment)
     }
 
-    fn within(sandbox: Sandbox, args: &[&str], fragment: &str) -> Self {
+    /// Starts the programs with the curtain, and the text of a scene in the menu.
+    pub(crate) fn with_scene_in_menu(text: &str) -> Self {
+        let sandbox = Sandbox::new();
+        let file = sandbox.write("scene.toml", text);
+        Self::within(sandbox, &["curtain"], &["--scene", &file], "")
+    }
+
+    fn within(sandbox: Sandbox, args: &[&str], bridge: &[&str], fragment: &str) -> Self {
         let browser = Rc::new(BrowserLock::acquire());
         let node = start_node(&sandbox, args);
         let recordings = sandbox.path("recordings");
-        let bridge = ["--listen", ANY_PORT, "--recordings", &recordings];
-        let (bridge, url) = start_bridge(&sandbox, &bridge);
+        let own = ["--listen", ANY_PORT, "--recordings", &recordings];
+        let (bridge, url) = start_bridge(&sandbox, &[&own, bridge].concat());
         let tab = Tab::open(&browser, &address(&url, fragment));
         let client = Client::attach(&sandbox.endpoint()).unwrap();
         Self { tab, client, state: State::default(), bridge, node, sandbox, url, browser }

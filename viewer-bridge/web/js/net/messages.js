@@ -1,7 +1,7 @@
 // Types of the text messages that the page receives (viewer-bridge/PROTOCOL.md, section 3).
 
 /** @typedef {number | number[] | null} ParameterValue */
-/** @typedef {{ name: string, rate_hz: number, dimensions: number, text: string }} SceneEntry */
+/** @typedef {{ name: string, rate_hz: number, dimensions: number, text: string, picture?: string }} SceneEntry */
 /**
  * @typedef {{
  *   type: "hello", protocol: number, version: string, client: number, mode: "live" | "replay", format: string,

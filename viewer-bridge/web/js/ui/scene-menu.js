@@ -56,10 +56,10 @@ export class SceneMenu {
   }
 
   /** @param {SceneEntry} scene @param {number} index */
-  card({ name, text, rate_hz }, index) {
+  card({ name, text, rate_hz, picture }, index) {
     const key = index < DIGITS ? [make("kbd", {}, String(index + 1))] : [];
     const card = make("button", { type: "button", "data-scene": name },
-      make("img", { src: `pictures/${name}.png`, width: 320, height: 240, alt: "" }),
+      picture === undefined ? make("i", { class: "picture", "aria-hidden": "true" }) : make("img", { class: "picture", src: picture, width: 320, height: 240, alt: "" }),
       make("strong", {}, name, ...key), make("span", {}, text), make("small", {}, `${rate_hz} Hz`));
     card.addEventListener("click", () => {
       this.dialog.close();
