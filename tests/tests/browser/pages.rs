@@ -54,6 +54,14 @@ fn a_link_asks_before_it_loads_its_scene_and_then_shows_its_view() {
 
 #[test]
 #[ignore = "needs Chromium"]
+fn a_link_with_an_unknown_scene_says_so_at_once() {
+    let rig = Rig::new(&["curtain"], "scene=nonsense");
+    rig.tab.wait("viewer.notices.includes('This link shows the scene “nonsense”, which this viewer does not have.')");
+    assert_eq!(rig.tab.evaluate("document.querySelector('#question').checkVisibility()"), false);
+}
+
+#[test]
+#[ignore = "needs Chromium"]
 fn two_pages_share_one_simulation() {
     let mut rig = Rig::new(&["curtain"], "");
     let other = rig.another_tab("");

@@ -14,6 +14,7 @@ import { Renderer } from "./gl/renderer.js";
 import { Hud } from "./ui/hud.js";
 import { Input } from "./tools/input.js";
 import { Hint, Question } from "./ui/prompts.js";
+import { followLink } from "./view/follow-link.js";
 import { parseLink } from "./view/link.js";
 import { Settling } from "./view/settling.js";
 import { Overlay } from "./ui/overlay.js";
@@ -136,7 +137,7 @@ function start(renderer) {
 
   listenToSimulation(input);
   listenToSurroundings(renderer, connector);
-  followLink(views, controls);
+  openLink(views, controls);
 
   let scriptMs = 0;
   const loop = (/** @type {number} */ nowMs) => {
@@ -214,26 +215,19 @@ function listenToSurroundings(renderer, connector) {
   });
 }
 
-/** Applies the camera and toggles of the address, once the scene is known. A link to another scene never
- * loads it by itself: the page asks. @param {Views} views @param {Controls} controls */
-function followLink(views, controls) {
+/** Applies the camera and toggles of the address, once the scene is known. @param {Views} views @param {Controls} controls */
+function openLink(views, controls) {
   for (const [name, isOn] of Object.entries(link.toggles)) if (name in views.app.renderer.toggles) views.chosen.set(name, isOn);
-  const { scene: requested, camera: pose } = link;
-  let isFollowed = false;
-  // Runs before the first frame of the scene, when the view applies the linked pose.
-  simulation.on("scene", ({ name }) => {
-    if (isFollowed || simulation.hello === null || simulation.node === null) return;
-    isFollowed = true;
-    if (requested === null || requested === name || !controls.canChange()) views.linkedPose = pose;
-    else ask(requested, name);
+  followLink(link, simulation, {
+    show: (pose) => { views.linkedPose = pose; },
+    ask: (wanted, present) => new Question().ask(
+      { text: `This link shows the scene “${wanted}”. Loading it replaces “${present}” for everybody.`, yes: `Load ${wanted}`, no: `Keep ${present}` },
+      (isYes) => {
+        if (!isYes) return;
+        views.poseOfScene = link.camera === null ? null : { scene: wanted, pose: link.camera };
+        controls.load(wanted);
+      },
+    ),
+    miss: (wanted) => banner.notify(`This link shows the scene “${wanted}”, which this viewer does not have.`, "warning"),
   });
-  /** @param {string} wanted @param {string} present */
-  const ask = (wanted, present) => new Question().ask(
-    { text: `This link shows the scene “${wanted}”. Loading it replaces “${present}” for everybody.`, yes: `Load ${wanted}`, no: `Keep ${present}` },
-    (isYes) => {
-      if (!isYes) return;
-      views.poseOfScene = pose === null ? null : { scene: wanted, pose };
-      controls.load(wanted);
-    },
-  );
 }

@@ -105,6 +105,7 @@ pub(super) const FILES: &[(&str, &[u8])] = files![
     "js/ui/undo.js",
     "js/ui/units.js",
     "js/ui/views.js",
+    "js/view/follow-link.js",
     "js/view/link.js",
     "js/view/settling.js",
     "js/viewer.js",
