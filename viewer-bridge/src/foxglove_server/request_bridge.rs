@@ -276,7 +276,7 @@ impl RequestBridge {
         if outcome.status == Status::Applied {
             request.values.push(parameter);
         } else {
-            request.refusals.push(refusal_text(&parameter.name, outcome));
+            request.refusals.push(parameter_text(&parameter.name, outcome));
             let mut present = present.iter().flat_map(parameters::list);
             request.values.extend(present.find(|one| one.name == parameter.name));
         }
@@ -302,9 +302,40 @@ fn refusal_text(name: &str, outcome: &OutcomeText) -> String {
     format!("{name}: {text}")
 }
 
+/// The reason of a refused value. It names the parameter once: most reasons begin with the name, without a part such as
+/// `.shear`.
+fn parameter_text(name: &str, outcome: &OutcomeText) -> String {
+    let base = name.split_once('.').map_or(name, |(base, _)| base);
+    match outcome.text.strip_prefix(base).filter(|rest| rest.starts_with(" accepts ")) {
+        Some(range) => format!("{name}{range}"),
+        None => refusal_text(name, outcome),
+    }
+}
+
 fn respond(responder: Responder, outcome: &OutcomeText) {
     match (outcome.status, serde_json::to_vec(outcome)) {
         (Status::Applied, Ok(json)) => responder.respond_ok(json),
         _ => responder.respond_err(refusal_text(outcome.kind, outcome)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use sim_contract::Parameter as Name;
+
+    use super::*;
+
+    #[test]
+    fn a_refused_parameter_is_named_once() {
+        let text = |name: &str, reason: Refusal| {
+            parameter_text(name, &OutcomeText::refused(None, "set", reason))
+        };
+        let range = Refusal::OutsideRange(Name::TearForce);
+        assert_eq!(text("tear_force", range), "tear_force accepts a number > 0");
+        let of_kind = text("compliance.shear", Refusal::OutsideRange(Name::Compliance));
+        assert!(of_kind.starts_with("compliance.shear accepts "), "{of_kind}");
+        let of_block = text("bending.7", Refusal::OutsideBlocks(Name::Bending));
+        assert!(of_block.starts_with("bending.7: bending of a block accepts "), "{of_block}");
+        assert!(text("damping", Refusal::NoNode).starts_with("damping: no node is running"));
     }
 }

@@ -7,6 +7,7 @@ use foxglove::websocket::service::{Handler, Request, Responder, Service, Service
 use serde::Deserialize;
 
 use super::request_bridge::RequestBridge;
+use crate::limits::STEPS_AT_ONCE_MAX;
 use crate::message::Command;
 
 /// Names of the services: those of the commands.
@@ -48,15 +49,27 @@ impl Handler for ServiceHandler {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct StepRequest {
+    /// Wide enough that a number out of range is named with its range.
     #[serde(default = "one")]
-    count: i32,
+    count: i64,
+}
+
+impl StepRequest {
+    /// Only forwards, as the schema says: a page may step back in a recording, but no live node can.
+    fn command(&self) -> Result<Command, String> {
+        let range = 1..=i64::from(STEPS_AT_ONCE_MAX);
+        match i32::try_from(self.count) {
+            Ok(count) if range.contains(&self.count) => Ok(Command::Step { count }),
+            _ => Err(format!("step: count accepts an integer from 1 to {STEPS_AT_ONCE_MAX}")),
+        }
+    }
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct EmptyRequest {}
 
-fn one() -> i32 {
+fn one() -> i64 {
     1
 }
 
@@ -66,7 +79,7 @@ fn parse(name: &str, payload: &[u8]) -> Result<Command, String> {
     if name == "step" {
         let request: StepRequest =
             serde_json::from_slice(payload).map_err(|error| malformed(&error))?;
-        return Ok(Command::Step { count: request.count });
+        return request.command();
     }
     let EmptyRequest {} = serde_json::from_slice(payload).map_err(|error| malformed(&error))?;
     match name {
@@ -93,5 +106,16 @@ mod tests {
         }
         assert_eq!(parse("step", br#"{"count":5}"#), Ok(Command::Step { count: 5 }));
         assert!(parse("step", br#"{"count":1.5}"#).is_err());
+    }
+
+    #[test]
+    fn a_number_of_steps_out_of_range_is_refused_with_the_range() {
+        let range = "step: count accepts an integer from 1 to 10000";
+        assert!(STEP_SCHEMA.contains(r#""minimum":1,"maximum":10000"#));
+        for count in ["-3", "0", "10001", "4294967297", "-9223372036854775808"] {
+            let request = format!("{{\"count\":{count}}}");
+            assert_eq!(parse("step", request.as_bytes()), Err(range.to_owned()), "{count}");
+        }
+        assert!(parse("step", br#"{"count":10000}"#).is_ok());
     }
 }
