@@ -89,7 +89,7 @@ export class Renderer {
     this.isDirty = true;
   }
 
-  /** Shadows, weave and solid bodies are drawn: in 3-D, unless they are turned off. */
+  /** Soft shadows, weave and solid bodies are drawn: in 3-D, unless they are turned off. */
   hasEffects() {
     return this.toggles.effects && this.simulation.scene !== null && !this.simulation.scene.isPlanar;
   }
@@ -251,6 +251,7 @@ export class Renderer {
     ground?.drawBackdrop(this.styles.backdrop);
     if (simulation.ground !== null && !simulation.scene?.isPlanar) {
       this.drawPlane(simulation.ground);
+      // Soft shadows belong to the effects. A plain one is cheap, and shows how high things are.
       if (this.toggles.shadow && !this.hasEffects()) this.drawShadows(simulation.ground);
     }
     gl.depthMask(true);
