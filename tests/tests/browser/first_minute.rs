@@ -79,6 +79,22 @@ fn every_scene_is_loaded_by_keys_and_from_the_menu_at_its_own_rate() {
 
 #[test]
 #[ignore = "needs Chromium"]
+fn quick_presses_of_the_key_for_the_next_scene_end_at_the_last_one_without_a_complaint() {
+    let rig = Rig::new(&["curtain"], "");
+    let catalog = Catalog::default();
+    // Some of the scenes before it have another rate, so that their loads begin other runs.
+    let last = &catalog.entries()[6].name;
+    for _ in 0..6 {
+        rig.tab.key(']');
+    }
+    rig.tab.wait(&format!(
+        "viewer.scene === '{last}' && viewer.frame >= 0 && viewer.unanswered === 0"
+    ));
+    assert_eq!(rig.tab.evaluate("viewer.notices"), json!([]));
+}
+
+#[test]
+#[ignore = "needs Chromium"]
 fn the_menu_shows_a_plain_card_for_a_scene_from_a_file() {
     let rig = Rig::with_scene_in_menu(&SWINGING.replace("version", "name = \"mine\"\nversion"));
     rig.tab.key('m');

@@ -101,6 +101,7 @@ pub(super) const FILES: &[(&str, &[u8])] = files![
     "js/ui/overlay.js",
     "js/ui/prompts.js",
     "js/ui/save.js",
+    "js/ui/scene-loader.js",
     "js/ui/scene-menu.js",
     "js/ui/undo.js",
     "js/ui/units.js",

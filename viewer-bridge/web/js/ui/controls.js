@@ -3,6 +3,7 @@
 import { enable, find } from "./dom.js";
 import { MODES } from "../tools/input.js";
 import { listenToKeys, returnFocus } from "./keys.js";
+import { SceneLoader } from "./scene-loader.js";
 import { SceneMenu, neighbour } from "./scene-menu.js";
 
 /** @typedef {import("../tools/input.js").Mode} Mode */
@@ -43,9 +44,7 @@ export class Controls {
     listenToKeys(this.keymap());
     returnFocus(input.canvas);
     const { simulation } = app;
-    /** The scene that is being loaded, for quick presses of a key. @type {string | null} */
-    this.requested = null;
-    for (const topic of /** @type {const} */ (["scene", "connection"])) simulation.on(topic, () => { this.requested = null; });
+    this.loader = new SceneLoader(simulation, app.commands);
     for (const topic of /** @type {const} */ (["hello", "node", "playback", "scene", "parameters", "connection", "past", "undoable"])) simulation.on(topic, () => this.show());
   }
 
@@ -145,8 +144,7 @@ export class Controls {
 
   /** @param {string} scene */
   load(scene) {
-    this.requested = scene;
-    this.app.commands.run("load", { scene }, ({ status }) => { if (status !== "applied") this.requested = null; });
+    this.loader.load(scene);
   }
 
   /** The name of the scene on show. */
@@ -171,7 +169,7 @@ export class Controls {
 
   /** Loads the scene before or after the present one in the list. @param {number} by */
   loadNeighbour(by) {
-    const scene = neighbour(this.scenes(), this.requested ?? this.name(), by);
+    const scene = neighbour(this.scenes(), this.loader.requested ?? this.name(), by);
     if (scene !== undefined && !this.scene.disabled) this.load(scene.name);
   }
 
