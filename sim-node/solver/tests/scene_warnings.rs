@@ -237,6 +237,53 @@ fn a_shape_that_starts_across_a_mesh_causes_a_warning_that_names_the_place() {
     );
 }
 
+/// A tube of 24 x 12 facets around a circle, at a height.
+fn torus(height: f64) -> String {
+    let vertex = |index: u32| {
+        let [around, along] = [(index / 12, 24.0), (index % 12, 12.0)]
+            .map(|(place, count)| std::f64::consts::TAU * f64::from(place) / count);
+        let radius = 0.25 + 0.1 * along.cos();
+        let (x, z) = (radius * around.cos(), radius * around.sin());
+        format!("[{x}, {}, {z}]", height + 0.1 * along.sin())
+    };
+    let face = |index: u32| {
+        let (ring, place) = (index / 12, index % 12);
+        let at = |ring: u32, place: u32| 12 * (ring % 24) + place % 12;
+        let [a, b] = [at(ring, place), at(ring, place + 1)];
+        let [c, d] = [at(ring + 1, place + 1), at(ring + 1, place)];
+        format!("[{a}, {b}, {c}, {d}]")
+    };
+    let list = |text: &dyn Fn(u32) -> String| (0..288).map(text).collect::<Vec<_>>().join(", ");
+    let (vertices, faces) = (list(&vertex), list(&face));
+    format!("[[collider]]\nshape = \"mesh\"\nvertices = [{vertices}]\nfaces = [{faces}]\n")
+}
+
+#[test]
+fn constraints_through_the_edges_of_a_mesh_cause_a_warning() {
+    let sheet = "[[generate]]\nshape = \"cloth\"\ncolumns = 41\nrows = 41\nspacing = 0.02\n\
+                 origin = [-0.4, 0.5, -0.4]\ndown = [0, 0, 1]\nmass = 0.001\npinned = \"none\"\n";
+    // In the middle, the sheet passes through a ring of edges, between facets at 30 degrees to each other.
+    for height in [0.45, 0.46, 0.48, 0.52] {
+        assert_warns(&format!("{sheet}{}", torus(height)), "200 constraints, the first");
+    }
+    // It lies on the top, and beside the tube.
+    for height in [0.39, 0.3] {
+        assert_eq!(warnings(&format!("{sheet}{}", torus(height))), Vec::<String>::new());
+    }
+}
+
+#[test]
+fn a_shape_that_starts_within_the_distance_of_a_mesh_causes_a_warning() {
+    let near = format!("{SHEET}{}", plate(-0.015, false));
+    let [warning] = &warnings(&near)[..] else { panic!("{:?}", warnings(&near)) };
+    let expected = "5 particles start within the distance of collider 0, a mesh; particle 20 is 0.005 m too near: the \
+                    first step pushes it away at once; move the shape, or use a distance of less than 0.02 m";
+    assert_eq!(warning, expected);
+    for height in [-0.02, -0.0199] {
+        assert_eq!(warnings(&format!("{SHEET}{}", plate(height, false))), Vec::<String>::new());
+    }
+}
+
 #[test]
 fn a_shape_beside_a_mesh_or_fixed_across_it_causes_no_warning() {
     for height in [-0.1, 0.45] {

@@ -37,6 +37,7 @@ impl Scene {
         ];
         let mut warnings: Vec<_> = all.into_iter().flatten().collect();
         warnings.extend(contacts::across_mesh(self, &model));
+        warnings.extend(contacts::within_distance(self, &model));
         warnings.extend(contacts::thickness(self, &model));
         warnings.extend(bending::unreached(self, &model));
         warnings.extend(bending::missing_hinges(self));

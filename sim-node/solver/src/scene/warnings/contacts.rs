@@ -14,7 +14,7 @@ use crate::contacts::pairs::CONNECTED_REACH;
 use crate::contacts::path::SubstepPath;
 use crate::contacts::solid::{Solid, solids};
 use crate::scene::definition::Scene;
-use crate::scene::definition::collider::SceneCollider;
+use crate::scene::definition::collider::{ColliderGeometry, SceneCollider};
 use crate::scene::definition::contact::ContactMode;
 use crate::scene::generate::{Generator, Shape};
 use crate::scene::model::Model;
@@ -28,6 +28,10 @@ const TOO_THIN: &str = "other particles pass between its particles; use at least
                         mode = \"surfaces\" for cloth";
 /// Cosine of the angle between the normals of opposite sides. An edge of 25 degrees is no corner to cut off.
 const OPPOSITE: f32 = -0.9;
+/// Part of a segment's length by which it is shifted off an edge that it may pass through.
+const SHIFT: f32 = 0.01;
+/// Part of a mesh's distance by which particles may start within it unnoticed.
+const WITHIN_MIN: f32 = 0.01;
 
 /// Warns of meshes that a shape starts on both sides of: one sentence for each mesh.
 pub(super) fn across_mesh(scene: &Scene, model: &Model) -> Vec<String> {
@@ -50,6 +54,33 @@ pub(super) fn across_mesh(scene: &Scene, model: &Model) -> Vec<String> {
         Some(format!(
             "{count} across collider {index}, a mesh: particles {a} and {b} are on different sides of it, and each \
              stays on its side; move the mesh or the shape"
+        ))
+    };
+    scene.colliders.iter().enumerate().filter_map(sentence).collect()
+}
+
+/// Warns of particles that start nearer to a mesh than its distance: one sentence for each mesh.
+pub(super) fn within_distance(scene: &Scene, model: &Model) -> Vec<String> {
+    let is_free = free(scene, model);
+    let sentence = |(index, collider): (usize, &SceneCollider)| {
+        let ColliderGeometry::Mesh { distance, .. } = collider.shape else { return None };
+        let mut mesh = MeshAtLoad::new(index, collider)?;
+        let free = model.particles.iter().enumerate().filter(|(particle, _)| is_free[*particle]);
+        let depths = free.filter_map(|(particle, one)| {
+            let depth = mesh.depth_within_distance(Vec3::from_array(one.position))?;
+            (depth > WITHIN_MIN * distance).then_some((particle, depth))
+        });
+        let depths: Vec<_> = depths.collect();
+        let (particle, depth) = depths.iter().rev().max_by(|(_, a), (_, b)| a.total_cmp(b))?;
+        let count = match depths.len() {
+            1 => "1 particle starts".to_owned(),
+            count => format!("{count} particles start"),
+        };
+        Some(format!(
+            "{count} within the distance of collider {index}, a mesh; particle {particle} is {} {unit} too near: the \
+             first step pushes it away at once; move the shape, or use a distance of less than {distance} {unit}",
+            three_digits(f64::from(*depth)),
+            unit = scene.unit
         ))
     };
     scene.colliders.iter().enumerate().filter_map(sentence).collect()
@@ -90,14 +121,40 @@ impl MeshAtLoad {
     }
 
     /// Returns `true` if the mesh separates two points outside any solid: a segment between them meets it first from opposite sides.
-    /// One that cuts a corner off meets it from two sides that are at an angle.
+    /// One that cuts a corner off meets it from two sides that are at an angle. So may one that passes through an edge:
+    /// then the segments beside it decide.
     fn is_between(&mut self, from: Vec3, to: Vec3) -> bool {
         if [from, to].into_iter().any(|end| self.placed.depth(end).is_some()) {
             return false;
         }
-        let Some(there) = self.first_normal(from, to) else { return false };
-        let Some(back) = self.first_normal(to, from) else { return false };
-        there.dot(back) < OPPOSITE
+        let Some((there, back)) = self.normals(from, to) else { return false };
+        let along = to - from;
+        let across = there - along * (there.dot(along) / along.dot(along));
+        let shift = across.normalize_or_zero() * (SHIFT * along.length());
+        let mut is_opposite = |shift: Vec3| {
+            let normals = self.normals(from + shift, to + shift);
+            normals.is_some_and(|(there, back)| there.dot(back) < OPPOSITE)
+        };
+        let angle = there.dot(back);
+        angle < OPPOSITE || angle < 0.0 && [shift, -shift].into_iter().any(&mut is_opposite)
+    }
+
+    /// Returns the normals of the first triangles that a segment passes through, from either end.
+    fn normals(&mut self, from: Vec3, to: Vec3) -> Option<(Vec3, Vec3)> {
+        Some((self.first_normal(from, to)?, self.first_normal(to, from)?))
+    }
+
+    /// Returns how much nearer than its distance a point outside any solid is to the mesh.
+    fn depth_within_distance(&mut self, point: Vec3) -> Option<f32> {
+        if self.placed.depth(point).is_some() {
+            return None;
+        }
+        let path = self.placed.path(&SubstepPath { start: point, displacement: Vec3::ZERO });
+        let around = self.placed.surroundings(&mut self.near, 0, &path);
+        match self.placed.stop(&path, &around, 0)? {
+            Stop::Push(hit) => Some(hit.depth),
+            Stop::Hold => None,
+        }
     }
 
     /// Returns the normal of the first triangle that a segment passes through, on the side of `from`.
