@@ -15,6 +15,17 @@ fn mesh_scene(obj: &str, keys: &str) -> Result<Scene, SceneError> {
     Scene::from_toml_with_files(&text, "test.toml", &read)
 }
 
+#[test]
+fn faces_with_vertices_of_their_own_cause_a_warning() {
+    // Two triangles of a quad; the corners that they share are there twice, one with a negative zero.
+    let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 0 -0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 4 5 6\n";
+    let warnings = mesh_scene(obj, "").unwrap().warnings();
+    let expected = "generate[0]: 2 of its 6 particles start where another one does";
+    assert!(warnings.iter().any(|one| one.starts_with(expected)), "{warnings:?}");
+    let whole = mesh_scene("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\nf 2 4 3\n", "").unwrap();
+    assert!(!whole.warnings().iter().any(|one| one.contains("another one")));
+}
+
 /// Faces of a sheet.
 #[derive(Clone, Copy, PartialEq)]
 enum Faces {

@@ -21,6 +21,7 @@ pub(crate) fn import(args: &ImportArgs) -> anyhow::Result<()> {
         // The user knows the only generator by the options.
         let warning = warning.replace("generate[0].pinned", "--pin");
         let warning = warning.replace("generate[0].bending", "--bending");
+        let warning = warning.replace("generate[0]: ", "");
         let warning = warning.replace(
             "give a mesh in another unit a `scale`",
             "give a mesh in another unit --scale",

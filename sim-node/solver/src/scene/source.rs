@@ -81,7 +81,15 @@ impl Scene {
         let text = read_file(path)
             .map_err(|problem| LoadError::Unreadable { path: source.to_owned(), problem })?;
         let folder = path.parent().unwrap_or(Path::new(""));
-        let read_mesh = |mesh: &str| read_file(&folder.join(mesh));
+        let read_mesh = |mesh: &str| {
+            let path = folder.join(mesh);
+            read_file(&path).map_err(|problem| {
+                format!(
+                    "{problem} (a path is relative to the scene, so this is {})",
+                    path.display()
+                )
+            })
+        };
         Ok(Self::from_toml_with_files(&text, source, &read_mesh)?)
     }
 }

@@ -43,6 +43,7 @@ impl Scene {
         warnings.extend(bending::missing_hinges(self));
         warnings.extend(shapes::without_length(self));
         warnings.extend(shapes::without_pins(self));
+        warnings.extend(shapes::loose_faces(self));
         warnings.extend(self.read_warnings.iter().cloned());
         warnings
     }

@@ -1,5 +1,7 @@
 //! Warnings about generators and anchors.
 
+use std::collections::HashSet;
+
 use crate::scene::definition::Scene;
 use crate::scene::generate::pinned::Pinned;
 use crate::scene::generate::{Generator, Shape};
@@ -32,6 +34,24 @@ pub(super) fn without_pins(scene: &Scene) -> Vec<String> {
         })
         .chain(anchors.map(|(index, _)| format!("anchor[{index}].particles is empty")))
         .collect()
+}
+
+/// Warns of meshes whose faces have vertices of their own where they meet.
+pub(super) fn loose_faces(scene: &Scene) -> Vec<String> {
+    let sentence = |(index, generator): (usize, &Generator)| {
+        let Shape::Obj(mesh) = &generator.shape else { return None };
+        let bits = |vertex: &[f32; 3]| vertex.map(|axis| (axis + 0.0).to_bits());
+        let places: HashSet<_> = mesh.vertices.iter().map(bits).collect();
+        let (count, all) = (mesh.vertices.len() - places.len(), mesh.vertices.len());
+        (count > 0).then(|| {
+            format!(
+                "generate[{index}]: {count} of its {all} particles start where another one does, and nothing holds them \
+                 together: the faces of the mesh do not share these vertices; merge them where the mesh was made (in \
+                 Blender: Mesh, Merge, By Distance)"
+            )
+        })
+    };
+    scene.generators.iter().enumerate().filter_map(sentence).collect()
 }
 
 /// Returns the coordinates of a mesh on each axis in parentheses, because its pins are compared with them.
