@@ -68,8 +68,8 @@ impl TriangleTiles {
     }
 
     /// Passes every particle and triangle to `accept` that may come nearer than the distance of the search, if there is a
-    /// stray among the particle and the corners of the triangle. `at_load` has what a tile of particles and one of
-    /// triangles were at load.
+    /// stray among the particle and the corners of the triangle. `at_load` tells, for a tile of particles and one of
+    /// triangles, which were near each other at load.
     pub(super) fn search(
         &mut self,
         (surface, wanted): (&Surface, Wanted),
