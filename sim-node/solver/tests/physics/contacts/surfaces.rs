@@ -143,8 +143,8 @@ fn a_stack_of_sheets_lies_at_the_contact_distance() {
     });
     let mut stack = solver(&(rates(240, 4) + CONTACT + &sheets.collect::<String>() + GROUND));
     step(&mut stack, 3 * 240);
-    // Micrometres in a substep remain.
-    assert_at_most("rms speed", 0.02, rms_speed(&stack));
+    // The upper sheets creep along the lower ones, by a micrometre in a substep.
+    assert_at_most("rms speed", 0.003, rms_speed(&stack));
     assert_eq!(crossings(&stack), 0);
     for (layer, particles) in stack.particles().chunks(144).enumerate() {
         let expected = 0.01 + SPACING * layer as f64;
