@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::error::ErrorKind;
-use recorder::simulation::{Job, SimulationResult, State, States, StepCount, simulate};
+use recorder::simulation::{Job, SimulationResult, Start, State, States, StepCount, simulate};
 use recorder::{
     Closing, ContentSelection, LogEnd, LogReader, OutcomeRow, PartFile, SceneColliders,
     TimedCommand, WriteError,
@@ -24,9 +24,9 @@ use crate::cli::output::{self, AsJson};
 use crate::cli::parse::whole_number;
 use crate::cli::progress::{progress_bar, progress_spinner};
 use crate::cli::thread_args::ThreadArgs;
-use crate::input::command_source::load_commands;
+use crate::input::command_source::CommandSource;
 use crate::input::scene_source::{is_recording, load_scene};
-use changes::{Changed, Changes, parse_setting};
+use changes::{Changed, Changes, Survey, parse_setting};
 use completion::Completion;
 
 /// Steps between two updates of the progress bar.
@@ -152,11 +152,14 @@ fn run_recording(args: &SimulateArgs, stop: &Stop) -> anyhow::Result<Exit> {
 
 /// Simulates a recording again with changed commands.
 fn run_changed(args: &SimulateArgs, stop: &Stop) -> anyhow::Result<Exit> {
-    let replaced =
-        args.commands.as_deref().map(|source| load_commands(source, stop)).transpose()?;
-    let changes = Changes { dropped: args.drop.clone(), added: args.set.clone(), replaced };
+    let source = args.commands(stop)?;
     let path = Path::new(&args.scene);
-    let changed = Changed::new(path, changes, stop).with_context(|| args.scene.clone())?;
+    let in_scene = || args.scene.clone();
+    let survey = Survey::read(path, stop).with_context(in_scene)?;
+    let first_state = survey.first_state().with_context(in_scene)?;
+    let replaced = source.map(|source| source.after(first_state)).transpose()?;
+    let changes = Changes { dropped: args.drop.clone(), added: args.set.clone(), replaced };
+    let changed = Changed::new(path, survey, changes, stop).with_context(in_scene)?;
     let end = changed.end.clone();
     let (job, solver, mut given) = changed.into_parts();
     let states = States { solver, given: |command: &TimedCommand| given.state_of(command) };
@@ -171,8 +174,8 @@ fn run_changed(args: &SimulateArgs, stop: &Stop) -> anyhow::Result<Exit> {
 /// Simulates a scene from its first step.
 fn run_scene(args: &SimulateArgs, steps: u64, stop: &Stop) -> anyhow::Result<Exit> {
     let scene = load_scene(&args.scene, stop)?;
-    let commands =
-        args.commands.as_deref().map_or(Ok(Vec::new()), |source| load_commands(source, stop))?;
+    let source = args.commands(stop)?;
+    let commands = source.map_or(Ok(Vec::new()), |source| source.after(Start::default()))?;
     let job = Job::new(scene, commands, steps);
     if let (Some(warning), Some(source)) = (warning_of_late_commands(&job), &args.commands) {
         output::note(&format!("warning: {}: {warning}", printable_line(source)));
@@ -222,6 +225,10 @@ fn run_job<E: From<WriteError> + Into<anyhow::Error>>(
 }
 
 impl SimulateArgs {
+    fn commands(&self, stop: &Stop) -> anyhow::Result<Option<CommandSource>> {
+        self.commands.as_deref().map(|source| CommandSource::load(source, stop)).transpose()
+    }
+
     fn has_changes(&self) -> bool {
         self.commands.is_some() || !self.drop.is_empty() || !self.set.is_empty()
     }

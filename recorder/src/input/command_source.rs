@@ -3,8 +3,10 @@
 use std::path::Path;
 
 use anyhow::{Context, bail};
+use recorder::simulation::Start;
 use recorder::{
-    LogEnd, LogReader, Message, OutcomeRow, TimedCommand, Topic, parse_commands, sort_commands,
+    LogEnd, LogReader, Message, OutcomeRow, StepRow, TimedCommand, Topic, parse_commands,
+    sort_commands,
 };
 use sim_contract::Stop;
 
@@ -17,48 +19,76 @@ const COMMAND_FILE_SIZE_BYTES_MAX: u64 = 1 << 30;
 /// Most commands of a recording to repeat: hours of a drag at 60 Hz. They take about 250 MB of memory.
 pub(crate) const COMMANDS_MAX: usize = 1 << 20;
 
-/// Reads commands and sorts them in the order of application. They are the outcomes of a recording
-/// if `source` ends in `.mcap`, else the lines of a command file.
-pub(crate) fn load_commands(source: &str, stop: &Stop) -> anyhow::Result<Vec<TimedCommand>> {
-    if is_recording(source) {
-        return commands_in_recording(Path::new(source), stop).with_context(|| source.to_owned());
-    }
-    let text = read_text_file(Path::new(source), COMMAND_FILE_SIZE_BYTES_MAX)
-        .with_context(|| format!("{source}: cannot read the commands"))?;
-    Ok(parse_commands(&text, source)?)
+/// Commands of a file, in the order of application.
+#[derive(Debug)]
+pub(crate) struct CommandSource {
+    name: String,
+    commands: Vec<TimedCommand>,
+    /// The first state of a recording: its commands are those after it.
+    start: Option<Start>,
 }
 
-fn commands_in_recording(path: &Path, stop: &Stop) -> anyhow::Result<Vec<TimedCommand>> {
-    let mut log = LogReader::open_until(path, stop)?;
-    log.selection().require(&[Topic::Outcomes], "`recorder simulate --commands`")?;
-    let mut first_row = None;
-    let mut commands = Vec::new();
-    while let Some(logged) = log.next_message()? {
-        match logged.message {
-            Message::Step(row) => _ = first_row.get_or_insert(row),
-            Message::Outcome(_) if commands.len() == COMMANDS_MAX => {
-                bail!("it has more than {COMMANDS_MAX} commands; prove it with `recorder verify`");
-            }
-            Message::Outcome(row) => commands.push(timed_command(&row)),
-            _ => {}
+impl CommandSource {
+    /// Reads commands and sorts them. They are the outcomes of a recording if `source` ends in `.mcap`,
+    /// else the lines of a command file.
+    pub(crate) fn load(source: &str, stop: &Stop) -> anyhow::Result<Self> {
+        if is_recording(source) {
+            return Self::from_recording(source, stop).with_context(|| source.to_owned());
         }
+        let text = read_text_file(Path::new(source), COMMAND_FILE_SIZE_BYTES_MAX)
+            .with_context(|| format!("{source}: cannot read the commands"))?;
+        Ok(Self { name: source.to_owned(), commands: parse_commands(&text, source)?, start: None })
     }
-    match log.end() {
-        Some(LogEnd::Complete) | None => {}
-        Some(end) => bail!("the file is {end}, so its commands are incomplete"),
+
+    fn from_recording(source: &str, stop: &Stop) -> anyhow::Result<Self> {
+        let mut log = LogReader::open_until(Path::new(source), stop)?;
+        log.selection().require(&[Topic::Outcomes], "`recorder simulate --commands`")?;
+        let mut start = None;
+        let mut commands = Vec::new();
+        while let Some(logged) = log.next_message()? {
+            match logged.message {
+                Message::Step(StepRow { step, outcome_count, .. }) => {
+                    _ = start.get_or_insert(Start { step, outcome_count });
+                }
+                Message::Outcome(_) if commands.len() == COMMANDS_MAX => {
+                    bail!(
+                        "it has more than {COMMANDS_MAX} commands; prove it with `recorder verify`"
+                    );
+                }
+                Message::Outcome(row) => commands.push(timed_command(&row)),
+                _ => {}
+            }
+        }
+        match log.end() {
+            Some(LogEnd::Complete) | None => {}
+            Some(end) => bail!("the file is {end}, so its commands are incomplete"),
+        }
+        sort_commands(&mut commands);
+        Ok(Self { name: source.to_owned(), commands, start })
     }
-    if let Some(row) = first_row
-        && row.outcome_count > 0
-    {
-        bail!(
-            "the recording starts at step {}, so it lacks the {} earlier commands of its run. Use a \
-             recording that starts at step 0, or prove this one with `recorder verify`",
-            row.step,
-            row.outcome_count
-        );
+
+    /// Returns the commands for a simulation from a state of a run.
+    ///
+    /// # Errors
+    /// They are those of a recording that starts after this state, so it can lack commands.
+    pub(crate) fn after(mut self, state: Start) -> anyhow::Result<Vec<TimedCommand>> {
+        let Some(start) = self.start else { return Ok(self.commands) };
+        let lacks_none = start.outcome_count == 0 || start.outcome_count == state.outcome_count;
+        if start.step > state.step && !lacks_none {
+            let or_before = if state.step > 0 { " or before" } else { "" };
+            bail!(
+                "{}: the recording starts at step {}, so it lacks the {} earlier commands of its run. Use a \
+                 recording that starts at step {}{or_before}, or prove this one with `recorder verify`",
+                self.name,
+                start.step,
+                start.outcome_count,
+                state.step
+            );
+        }
+        // The first state of a recording has the effect of the commands of its own step.
+        self.commands.retain(|command| command.step > start.step);
+        Ok(self.commands)
     }
-    sort_commands(&mut commands);
-    Ok(commands)
 }
 
 pub(crate) fn timed_command(row: &OutcomeRow) -> TimedCommand {
@@ -75,12 +105,11 @@ pub(crate) fn timed_command(row: &OutcomeRow) -> TimedCommand {
 mod tests {
     use std::fs;
 
-    use recorder::{Closing, LogOptions, LogWriter, RunDescription, StepRow, Up};
+    use recorder::{Closing, LogOptions, LogWriter, RunDescription, Up};
 
     use super::*;
 
-    #[test]
-    fn a_recording_that_starts_after_some_commands_is_refused() {
+    fn recording(path: &Path, outcome_count: u64) -> CommandSource {
         let description = RunDescription {
             run_id: 1,
             epoch_ns: 0,
@@ -96,21 +125,32 @@ mod tests {
             contract_version: 1,
             recorder_version: "0.1.0".to_owned(),
         };
+        let mut log =
+            LogWriter::create(Vec::new(), LogOptions::default(), &description, b"", 0).unwrap();
+        let row = StepRow { step: 120, outcome_count, ..StepRow::default() };
+        log.write(&Message::Step(row), 0).unwrap();
+        fs::write(path, log.finish(&Closing::default()).unwrap()).unwrap();
+        CommandSource::load(&path.display().to_string(), &Stop::default()).unwrap()
+    }
+
+    #[test]
+    fn a_recording_that_starts_after_some_commands_of_the_simulation_is_refused() {
         let path = std::env::temp_dir().join(format!("late-{}.mcap", std::process::id()));
-        let load = |outcome_count| {
-            let options = LogOptions::default();
-            let mut log = LogWriter::create(Vec::new(), options, &description, b"", 0).unwrap();
-            let row = StepRow { step: 120, outcome_count, ..StepRow::default() };
-            log.write(&Message::Step(row), 0).unwrap();
-            fs::write(&path, log.finish(&Closing::default()).unwrap()).unwrap();
-            load_commands(&path.display().to_string(), &Stop::default())
+        let after = |outcome_count, step, known_count| {
+            recording(&path, outcome_count).after(Start { step, outcome_count: known_count })
         };
-        assert_eq!(load(0).unwrap(), []);
-        let error = format!("{:#}", load(3).unwrap_err());
+        for (outcome_count, step, known_count) in [(0, 0, 0), (3, 120, 3), (3, 200, 5), (3, 60, 3)]
+        {
+            assert_eq!(after(outcome_count, step, known_count).unwrap(), []);
+        }
+        let errors = [(0, 0), (60, 2)].map(|(step, known)| after(3, step, known).unwrap_err());
         fs::remove_file(&path).unwrap();
-        let expected = ".mcap: the recording starts at step 120, so it lacks the 3 earlier commands \
-            of its run. Use a recording that starts at step 0, or prove this one with `recorder \
-            verify`";
-        assert!(error.ends_with(expected), "{error}");
+        for (error, place) in errors.iter().zip(["step 0", "step 60 or before"]) {
+            let expected = format!(
+                ".mcap: the recording starts at step 120, so it lacks the 3 earlier commands of its run. \
+                 Use a recording that starts at {place}, or prove this one with `recorder verify`"
+            );
+            assert!(error.to_string().ends_with(&expected), "{error}");
+        }
     }
 }

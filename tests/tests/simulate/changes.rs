@@ -150,6 +150,24 @@ fn the_same_commands_from_a_file_give_the_same_states() {
     assert!(new.iter().zip(&recorded).all(|(one, other)| is_same(one, other)));
 }
 
+#[test]
+fn a_recording_is_its_own_command_file_wherever_it_starts() {
+    let sandbox = Sandbox::new();
+    let (run, changed) = (sandbox.path("run.mcap"), sandbox.path("changed.mcap"));
+    record_mid_run(&sandbox, &run);
+    let recorded = frames(&run);
+    assert!(recorded[0].row.outcome_count > 0);
+    recorder(&sandbox, &["simulate", &run, "--commands", &run, "-o", &changed]).success();
+    let new = frames(&changed);
+    assert_eq!(new.len(), recorded.len());
+    assert!(new.iter().zip(&recorded).all(|(one, other)| is_same(one, other)));
+    // From step 0 of the scene, it lacks those before it.
+    let late = ["simulate", &run, "--steps", "900", "--commands", &run];
+    let refused = recorder(&sandbox, &late);
+    assert_eq!(refused.code, Some(1), "{refused:?}");
+    assert!(refused.stderr.contains("earlier commands of its run"), "{refused:?}");
+}
+
 /// Simulates 500 steps of a rope with commands.
 fn simulate_rope(sandbox: &Sandbox, name: &str, commands: &str) -> String {
     let file = sandbox.path(&format!("{name}.mcap"));

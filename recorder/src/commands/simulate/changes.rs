@@ -80,9 +80,12 @@ fn wrong_in_every_scene(action: &Action) -> Option<Reason> {
     (!is_allowed).then_some(Reason::OutOfRange)
 }
 
-/// The steps, states and commands of a recording.
-#[derive(Debug, Default)]
-struct Survey {
+/// The scene, steps, states and commands of a recording.
+#[derive(Debug)]
+pub(super) struct Survey {
+    scene: Scene,
+    /// The first state with particles and a keyframe.
+    first_state: Option<Start>,
     /// Steps with particles and a keyframe, ascending.
     states: Vec<u64>,
     last_step: u64,
@@ -91,13 +94,21 @@ struct Survey {
 }
 
 impl Survey {
-    fn read(path: &Path, stop: &Stop) -> anyhow::Result<Self> {
-        let mut frames = FrameReader::new(LogReader::open_until(path, stop)?);
-        let mut survey = Self::default();
+    fn new(scene: Scene) -> Self {
+        let (states, outcomes) = (Vec::new(), Vec::new());
+        Self { scene, first_state: None, states, last_step: 0, outcomes, end: None }
+    }
+
+    pub(super) fn read(path: &Path, stop: &Stop) -> anyhow::Result<Self> {
+        let log = LogReader::open_until(path, stop)?;
+        let mut survey = Self::new(scene_to_simulate(&log, "`recorder simulate`")?);
+        let mut frames = FrameReader::new(log);
         while let Some(frame) = frames.next_frame()? {
             let step = frame.row.step;
             if frame.own_keyframe().is_some() && frame.particles.is_some() {
                 survey.states.push(step);
+                let outcome_count = frame.row.outcome_count;
+                _ = survey.first_state.get_or_insert(Start { step, outcome_count });
             }
             survey.last_step = step;
             survey.add_outcomes(&frame.updates)?;
@@ -118,9 +129,14 @@ impl Survey {
         Ok(())
     }
 
+    /// Returns the first state that a simulation can start from.
+    pub(super) fn first_state(&self) -> anyhow::Result<Start> {
+        self.first_state.context("has no complete state to start from")
+    }
+
     /// Returns the first step that a change concerns.
     fn first_change(&self, changes: &Changes) -> anyhow::Result<u64> {
-        let first_state = *self.states.first().context("has no complete state to start from")?;
+        let first_state = self.first_state()?.step;
         let mut steps = Vec::new();
         for index in &changes.dropped {
             let row = self.outcomes.iter().find(|row| row.index == *index);
@@ -183,18 +199,20 @@ pub(super) struct Changed {
 }
 
 impl Changed {
-    pub(super) fn new(path: &Path, changes: Changes, stop: &Stop) -> anyhow::Result<Self> {
-        let log = LogReader::open_until(path, stop)?;
-        let scene = scene_to_simulate(&log, "`recorder simulate`")?;
-        let survey = Survey::read(path, stop)?;
+    pub(super) fn new(
+        path: &Path,
+        survey: Survey,
+        changes: Changes,
+        stop: &Stop,
+    ) -> anyhow::Result<Self> {
         let start_step = survey.start(survey.first_change(&changes)?, &changes)?;
-        let mut frames = FrameReader::new(log);
-        let (solver, outcome_count) = restore(&scene, &mut frames, start_step)?;
+        let mut frames = FrameReader::new(LogReader::open_until(path, stop)?);
+        let (solver, outcome_count) = restore(&survey.scene, &mut frames, start_step)?;
         let commands = commands(&survey, changes, outcome_count);
         check_last_step(&commands, survey.last_step)?;
         let given = GivenStates::new(frames, &survey.outcomes);
         let start = Start { step: start_step, outcome_count };
-        let job = Job { scene, commands, steps: survey.last_step, start };
+        let job = Job { scene: survey.scene, commands, steps: survey.last_step, start };
         Ok(Self { job, solver, given, end: survey.end.unwrap_or(LogEnd::Complete) })
     }
 
