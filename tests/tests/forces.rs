@@ -167,6 +167,22 @@ fn recorded_forces_are_proved_simulated_again_and_played() {
 }
 
 #[test]
+fn a_paused_replay_with_forces_names_its_pause() {
+    let sandbox = Sandbox::new();
+    let file = sandbox.path("run.mcap");
+    let recorder = |args: &[&str]| Process::run(Program::Recorder, &sandbox, args);
+    recorder(&["simulate", "rope", "--steps", "240", "--forces", "-o", &file]).success();
+    let args = ["play", &file, "--loop"];
+    let _player = Process::start_ready(Program::Recorder, &sandbox, &args);
+    ctl(&sandbox, &["pause"]);
+    let forces = Process::run(Program::SimNode, &sandbox, &["ctl", "forces", "--timeout", "200ms"]);
+    assert_eq!(forces.code, Some(1));
+    assert!(forces.stderr.contains("the replay is paused"), "{forces:?}");
+    ctl(&sandbox, &["resume"]);
+    assert_eq!(ctl(&sandbox, &["forces"])["particles"].as_array().unwrap().len(), 1);
+}
+
+#[test]
 fn a_node_computes_no_forces_for_a_killed_reader() {
     for is_killed in [false, true] {
         let sandbox = Sandbox::new();

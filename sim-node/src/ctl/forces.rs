@@ -4,7 +4,7 @@ use anyhow::bail;
 use serde::Serialize;
 use sim_contract::{
     Client, ColliderShape, ColliderState, ForceKind, ForceRow, Forces, NodeStatus, ParticleFlags,
-    ParticleState, StatusFlags,
+    ParticleState,
 };
 
 use crate::args::CtlArgs;
@@ -60,8 +60,12 @@ pub(super) fn print(client: &mut Client, args: &CtlArgs) -> anyhow::Result<()> {
 /// Returns the reason why a node has published no forces.
 fn missing(status: Option<&NodeStatus>) -> &'static str {
     match status {
+        Some(status) if status.is_replay() && status.is_paused() => {
+            "the replay is paused, and forces are those of a step; run `ctl step` while this waits, or `ctl resume`. \
+             Only a recording made with `recorder record --forces` has them"
+        }
         Some(status) if status.is_replay() => "the recording has none (`recorder record --forces`)",
-        Some(status) if status.flags & StatusFlags::PAUSED != 0 => {
+        Some(status) if status.is_paused() => {
             "it is paused, and forces are those of a step; run `ctl step` while this waits, or `ctl resume`"
         }
         _ => "is it stopped?",
@@ -148,7 +152,7 @@ impl ForceReport {
 
 #[cfg(test)]
 mod tests {
-    use sim_contract::ForcesHeader;
+    use sim_contract::{ForcesHeader, StatusFlags};
 
     use super::*;
 
@@ -213,9 +217,9 @@ mod tests {
     fn a_node_without_forces_is_explained() {
         let status = |flags| NodeStatus { flags, ..NodeStatus::default() };
         assert!(missing(Some(&status(StatusFlags::PAUSED))).contains("ctl step"));
-        assert!(
-            missing(Some(&status(StatusFlags::REPLAY | StatusFlags::PAUSED))).contains("--forces")
-        );
+        assert!(missing(Some(&status(StatusFlags::REPLAY))).contains("the recording has none"));
+        let paused = missing(Some(&status(StatusFlags::REPLAY | StatusFlags::PAUSED)));
+        assert!(paused.contains("is paused") && paused.contains("`ctl resume`"), "{paused}");
         assert_eq!(missing(Some(&status(0))), missing(None));
     }
 }
