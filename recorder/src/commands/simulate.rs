@@ -15,7 +15,7 @@ use recorder::{
 };
 use serde::Serialize;
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
-use sim_contract::{Action, Outcome, Reason, Stop, part_path, printable_line};
+use sim_contract::{Action, Outcome, Reason, Stop, allowed_indices, part_path, printable_line};
 use sim_solver::{Scene, Solver};
 
 use crate::cli::exit::{Exit, with_usage};
@@ -195,6 +195,7 @@ fn run_job<E: From<WriteError> + Into<anyhow::Error>>(
     states.solver.compute_forces(args.forces && args.output.is_some());
     let output = args.output.as_deref();
     let mut log = output.map(|path| begin(args, path, job, &states.solver)).transpose()?;
+    let counts = ElementCounts::new(&job.scene, &states.solver);
     let first_step = job.start.step;
     let bar = progress_bar(job.steps - first_step);
     let before_ns = monotonic_ns();
@@ -209,7 +210,7 @@ fn run_job<E: From<WriteError> + Into<anyhow::Error>>(
     let path = path.with_context(|| truncation(args))?;
     let wall_ns = monotonic_ns() - before_ns;
 
-    note_rejections(&result);
+    note_rejections(&result, &counts);
     note_incomplete_contacts(&result);
     let simulated = Simulated {
         scene: &job.scene,
@@ -280,7 +281,7 @@ fn finish(log: LogFile, result: &SimulationResult, steps: u64) -> anyhow::Result
 }
 
 /// Reports the first rejected commands. The recording has all of them.
-fn note_rejections(result: &SimulationResult) {
+fn note_rejections(result: &SimulationResult, counts: &ElementCounts) {
     for outcome in &result.rejections {
         let row = OutcomeRow::from(outcome);
         let kind = serde_json::to_value(row.action).unwrap_or_default();
@@ -290,7 +291,7 @@ fn note_rejections(result: &SimulationResult) {
             kind["kind"].as_str().unwrap_or("a command"),
             row.client_id,
             row.sequence,
-            cause(outcome)
+            cause(outcome, counts)
         ));
     }
 }
@@ -305,15 +306,43 @@ fn note_incomplete_contacts(result: &SimulationResult) {
     }
 }
 
-/// Returns the reason of a rejection with its meaning and the allowed values.
-fn cause(outcome: &Outcome) -> String {
+/// Numbers of the elements of a scene that commands name by an index.
+struct ElementCounts {
+    particles: usize,
+    constraints: usize,
+    anchors: usize,
+    colliders: usize,
+}
+
+impl ElementCounts {
+    fn new(scene: &Scene, solver: &Solver) -> Self {
+        Self {
+            particles: solver.particles().len(),
+            constraints: solver.constraints().count(),
+            anchors: scene.anchors.len(),
+            colliders: scene.colliders.len(),
+        }
+    }
+
+    /// Returns the allowed indices, if a command was rejected for an unknown one.
+    fn allowed(&self, reason: Reason) -> Option<String> {
+        Some(allowed_indices(match reason {
+            Reason::UnknownParticle => self.particles,
+            Reason::UnknownConstraint => self.constraints,
+            Reason::UnknownAnchor => self.anchors,
+            Reason::UnknownCollider => self.colliders,
+            _ => return None,
+        }))
+    }
+}
+
+/// Returns the reason of a rejection with its meaning and its remedy.
+fn cause(outcome: &Outcome, counts: &ElementCounts) -> String {
     let Some(reason) = outcome.reason() else { return outcome.reason_name().to_owned() };
     let action = outcome.command.action();
-    let allowed = action.allowed_values(reason).map(|allowed| format!("allowed: {allowed}"));
-    let condition = || missing_condition(&action).map(str::to_owned);
     let remedy = match reason {
-        Reason::NoEffectHere => condition(),
-        _ => allowed,
+        Reason::NoEffectHere => missing_condition(&action).map(str::to_owned),
+        _ => counts.allowed(reason).or_else(|| outcome.remedy()),
     };
     let remedy = remedy.map_or_else(String::new, |remedy| format!(" ({remedy})"));
     format!("{}: {reason}{remedy}", reason.name())

@@ -1081,8 +1081,8 @@ const char *catenary_reason_name(uint32_t reason);
 // as the process.
 const char *catenary_parameter_name(uint32_t parameter);
 
-// Returns the text of the last failed call of this thread, in UTF-8 and never null: the cause and the
-// cure, as `sim-node ctl` prints them. Empty if no call has failed.
+// Returns the text of the last failed call of this thread, in UTF-8 and never null: the cause, and the
+// cure where one is known, such as the allowed values of a rejected command. Empty if no call has failed.
 //
 // The text is valid until the next failed call of this thread.
 const char *catenary_last_error(void);

@@ -122,8 +122,8 @@ pub(crate) fn guard(call: impl FnOnce() -> Result<(), Failure>) -> CatenaryResul
     result
 }
 
-/// Returns the text of the last failed call of this thread, in UTF-8 and never null: the cause and the
-/// cure, as `sim-node ctl` prints them. Empty if no call has failed.
+/// Returns the text of the last failed call of this thread, in UTF-8 and never null: the cause, and the
+/// cure where one is known, such as the allowed values of a rejected command. Empty if no call has failed.
 ///
 /// The text is valid until the next failed call of this thread.
 #[unsafe(no_mangle)]

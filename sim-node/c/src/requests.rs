@@ -1,12 +1,16 @@
 //! Sending of commands, and their outcomes.
 
 use std::mem::MaybeUninit;
+use std::time::Duration;
 
-use sim_contract::{Action, Command, GivenState, Outcome, ParticleState};
+use sim_contract::{Action, Client, Command, GivenState, Outcome, ParticleState};
 
 use crate::attached::{ClientHandle, with_client};
 use crate::outcome::{CatenaryResult, Failure};
 use crate::pointers::{array, check_place, timeout, write};
+
+/// Longest wait for the number of elements of the scene, which a node has published with its load.
+const REMEDY_TIMEOUT: Duration = Duration::from_millis(100);
 
 /// A complete state for `catenary_restore`, or the motion of its particles.
 #[derive(Debug)]
@@ -38,7 +42,8 @@ pub extern "C" fn catenary_request(
 ) -> CatenaryResult {
     with_client(client, |attached| {
         let action = action(&command)?;
-        report(&attached.client.request(action, timeout(timeout_s)?)?, outcome)
+        let answer = attached.client.request(action, timeout(timeout_s)?)?;
+        report(&mut attached.client, &answer, outcome)
     })
 }
 
@@ -90,7 +95,8 @@ pub extern "C" fn catenary_restore(
             particles: array(state.particles, state.particle_count, "particles")?,
             keyframe: (!state.keyframe.is_null()).then_some(keyframe),
         };
-        report(&attached.client.restore(&given, timeout(timeout_s)?)?, outcome)
+        let answer = attached.client.restore(&given, timeout(timeout_s)?)?;
+        report(&mut attached.client, &answer, outcome)
     })
 }
 
@@ -103,7 +109,11 @@ fn action(command: &Command) -> Result<Action, Failure> {
     Ok(command.action())
 }
 
-fn report(answer: &Outcome, place: Option<&mut MaybeUninit<Outcome>>) -> Result<(), Failure> {
+fn report(
+    client: &mut Client,
+    answer: &Outcome,
+    place: Option<&mut MaybeUninit<Outcome>>,
+) -> Result<(), Failure> {
     if let Some(place) = place {
         place.write(*answer);
     }
@@ -111,7 +121,9 @@ fn report(answer: &Outcome, place: Option<&mut MaybeUninit<Outcome>>) -> Result<
         return Ok(());
     }
     let explanation = answer.reason().map(|reason| format!(": {reason}")).unwrap_or_default();
+    let remedy = client.remedy(answer, REMEDY_TIMEOUT);
+    let remedy = remedy.map(|remedy| format!(" ({remedy})")).unwrap_or_default();
     let (step, name) = (answer.step, answer.reason_name());
-    let text = format!("rejected at step {step}: {name}{explanation}");
+    let text = format!("rejected at step {step}: {name}{explanation}{remedy}");
     Err(Failure::new(CatenaryResult::Rejected, text))
 }

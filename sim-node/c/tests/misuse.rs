@@ -11,7 +11,7 @@ use std::{slice, thread};
 use catenary::*;
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::testing::TestDomain;
-use sim_contract::{Command, Outcome, Reason, Wake};
+use sim_contract::{Command, Outcome, Owner, Reason, Wake};
 use support::*;
 
 fn assert_misuse(result: CatenaryResult, part: &str) {
@@ -199,19 +199,21 @@ fn the_end_of_a_node_and_silence_are_two_results() {
     assert_eq!(catenary_detach(client), CatenaryResult::Ok);
 }
 
-#[test]
-fn a_rejection_is_a_result_with_its_reason() {
-    let domain = TestDomain::new();
-    let owner = owner(&domain);
-    let client = attach(&domain, &owner);
+/// Sends a command that the node rejects at step 5. Returns the text of the error, and the outcome.
+fn rejection(
+    owner: &Owner,
+    client: *mut ClientHandle,
+    command: Command,
+    reason: Reason,
+) -> (String, Outcome) {
     let address = client.addr();
     let asker = thread::spawn(move || {
         let client = std::ptr::without_provenance_mut(address);
         let mut outcome = MaybeUninit::<Outcome>::zeroed();
-        let release = catenary_command_release(1);
-        let result = catenary_request(client, release, TIMEOUT_S, Some(&mut outcome));
+        let result = catenary_request(client, command, TIMEOUT_S, Some(&mut outcome));
+        assert_eq!(result, CatenaryResult::Rejected);
         // SAFETY: an outcome may be zero, and was written.
-        (result, last_error(), unsafe { outcome.assume_init() })
+        (last_error(), unsafe { outcome.assume_init() })
     });
     let mut received = Vec::new();
     while received.is_empty() {
@@ -219,14 +221,48 @@ fn a_rejection_is_a_result_with_its_reason() {
         owner.receive_commands(&mut received);
         thread::yield_now();
     }
-    let outcome = Outcome::new(0, 5, received[0].command, Err(Reason::NotGrabbed));
-    owner.publish_outcome(&outcome).unwrap();
+    owner.publish_outcome(&Outcome::new(0, 5, received[0].command, Err(reason))).unwrap();
     owner.wake(Wake::Outcome);
-    let (result, error, answer) = asker.join().unwrap();
-    assert_eq!(result, CatenaryResult::Rejected);
+    while !asker.is_finished() {
+        owner.refresh();
+        thread::yield_now();
+    }
+    asker.join().unwrap()
+}
+
+#[test]
+fn a_rejection_is_a_result_with_its_reason() {
+    let domain = TestDomain::new();
+    let owner = owner(&domain);
+    let client = attach(&domain, &owner);
+    let release = catenary_command_release(1);
+    let (error, answer) = rejection(&owner, client, release, Reason::NotGrabbed);
     assert_eq!(error, "rejected at step 5: not_grabbed: the particle is not grabbed");
     assert_eq!((answer.step, answer.reason), (5, Reason::NotGrabbed as u32));
     assert_eq!(text(catenary_reason_name(answer.reason)), "not_grabbed");
     assert_eq!(text(catenary_reason_name(99)), "unknown");
+    assert_eq!(catenary_detach(client), CatenaryResult::Ok);
+}
+
+#[test]
+fn a_rejection_names_the_allowed_values_and_indices() {
+    let domain = TestDomain::new();
+    let owner = owner(&domain);
+    let client = attach(&domain, &owner);
+    let text = |command, reason| rejection(&owner, client, command, reason).0;
+    let set = catenary_command_set(c"tear_force".as_ptr(), -1.0);
+    assert_eq!(
+        text(set, Reason::OutOfRange),
+        "rejected at step 5: out_of_range: a value is out of its range (allowed: a number > 0, or off for no limit)"
+    );
+    let particle = text(catenary_command_pin(9999), Reason::UnknownParticle);
+    assert!(particle.ends_with("the scene has no such particle (allowed: 0 to 1)"), "{particle}");
+    let constraint = text(catenary_command_cut(9999), Reason::UnknownConstraint);
+    assert!(constraint.ends_with("(allowed: 0)"), "{constraint}");
+    let scene = text(catenary_command_load(c"nosuch".as_ptr()), Reason::OutOfRange);
+    assert!(
+        scene.ends_with("(allowed: a scene that the node can read; see its messages)"),
+        "{scene}"
+    );
     assert_eq!(catenary_detach(client), CatenaryResult::Ok);
 }

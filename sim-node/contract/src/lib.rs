@@ -114,6 +114,6 @@ pub use sim_types::{
     ColliderShape, ConstraintKind, ELEMENTS_MAX, GRAB_OVER_S_DEFAULT, KindFilter, Method,
     NumberRange, OffMeaning, PARAMETERS, Parameter, ParameterInfo, ParameterValue, ParameterValues,
     ParticleFlags, PerKind, PlainF32, Reason, RestoreContents, SCENE_SIZE_BYTES_MAX,
-    SETTINGS_COUNT, STEP_WORK_MAX, Setting, TearCause, Text, TextError, ValueForm, json_hash,
-    printable, printable_line,
+    SETTINGS_COUNT, STEP_WORK_MAX, Setting, TearCause, Text, TextError, ValueForm, allowed_indices,
+    json_hash, printable, printable_line,
 };

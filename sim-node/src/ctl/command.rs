@@ -5,7 +5,7 @@ use std::time::Duration;
 use anyhow::bail;
 use serde::Serialize;
 use sim_contract::clock::monotonic_ns;
-use sim_contract::{Action, Client, OUTCOME_FLAG_CONTROL, Outcome};
+use sim_contract::{Action, Client, Outcome};
 
 use super::{hint, rejection};
 use crate::args::CtlArgs;
@@ -90,7 +90,7 @@ fn wait_for_steps(
 ) -> anyhow::Result<()> {
     let last = outcome.step + u64::from(count) - 1;
     let silence_max = args.timeout() + period(client, args.timeout())?;
-    let is_replay = outcome.flags & OUTCOME_FLAG_CONTROL != 0;
+    let is_replay = outcome.is_of_replay();
     let mut since_ns = monotonic_ns();
     loop {
         let passed = Duration::from_nanos(monotonic_ns() - since_ns);

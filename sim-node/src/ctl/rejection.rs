@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use sim_contract::{Action, Client, Outcome, Reason, SnapshotHeader};
+use sim_contract::{Action, Client, Outcome, Reason, SnapshotHeader, allowed_indices};
 use sim_solver::Scene;
 
 /// Explains a rejection: the meaning of its reason, and the remedy in parentheses where one is known.
@@ -23,29 +23,23 @@ fn remedy(
     reason: Reason,
 ) -> Option<String> {
     let action = &outcome.command.action();
-    let mut status = || client.status(timeout).ok().flatten();
-    let count = match reason {
-        Reason::UnknownParticle => status()?.particle_count as usize,
-        Reason::UnknownConstraint => status()?.constraint_count as usize,
-        Reason::UnknownAnchor => anchor_count(client, timeout)?,
-        Reason::UnknownCollider => client.colliders(timeout).ok()?.colliders.len(),
+    match reason {
+        Reason::UnknownAnchor => Some(allowed_indices(anchor_count(client, timeout)?)),
         Reason::UnknownStep if is_before_run(action, outcome.step) => {
-            let rate_hz = status()?.rate_hz;
+            let rate_hz = client.status(timeout).ok().flatten()?.rate_hz;
             let newest = client.latest_snapshot(timeout).ok().flatten()?;
-            return Some(age_of_run(outcome.step, rate_hz, first_step(newest.header())));
+            Some(age_of_run(outcome.step, rate_hz, first_step(newest.header())))
         }
         Reason::UnknownStep => {
             let snapshot = client.latest_snapshot(timeout).ok().flatten()?;
             let remedy = age_of_scene(action, outcome.step, snapshot.header());
-            return remedy.or_else(|| fixed_remedy(action, reason));
+            remedy.or_else(|| console_remedy(outcome, reason).map(str::to_owned))
         }
-        _ => {
-            let of_replay = remedy_of_replay(action, reason);
-            let mut is_replay = || status().is_some_and(|status| status.is_replay());
-            return of_replay.filter(|_| is_replay()).or_else(|| fixed_remedy(action, reason));
-        }
-    };
-    Some(allowed_indices(count))
+        _ => match console_remedy(outcome, reason) {
+            Some(remedy) => Some(remedy.to_owned()),
+            None => client.remedy(outcome, timeout),
+        },
+    }
 }
 
 /// Returns `true` if a rewind, rejected before `step` was made, asks for a time before the run.
@@ -85,77 +79,44 @@ fn age_of_scene(action: &Action, step: u64, newest: &SnapshotHeader) -> Option<S
     (to_step.or(back_steps)? < first).then(|| start_of_scene(first))
 }
 
-/// Remedy of a rejection by a replay, where it is not that of a node.
-fn remedy_of_replay(action: &Action, reason: Reason) -> Option<String> {
-    let remedy = match (reason, action) {
-        (Reason::NoEffectHere, Action::Step { .. }) => return None,
-        (Reason::NoEffectHere, _) => {
-            "a recording accepts only pause, resume, step, rewind and set time_scale"
-        }
-        (Reason::OutOfRange, Action::Rewind { .. }) => "allowed: a step of the recording",
-        (Reason::OutOfRange, Action::Step { count }) if *count > 0 => {
-            "the replay stands at its last snapshot; `ctl rewind` goes back"
-        }
-        (Reason::OutOfRange, Action::Set { .. }) => "allowed: 0.01 to 100",
-        _ => return None,
-    };
-    Some(remedy.to_owned())
-}
-
 /// Number of anchors, which only the scene names.
 fn anchor_count(client: &mut Client, timeout: Duration) -> Option<usize> {
     let scene = client.scene(timeout).ok()??;
     Some(Scene::from_toml(&scene, "scene").ok()?.anchors.len())
 }
 
-fn allowed_indices(count: usize) -> String {
-    match count {
-        0 => "it has none".to_owned(),
-        1 => "allowed: 0".to_owned(),
-        count => format!("allowed: 0 to {}", count - 1),
-    }
-}
-
-/// Remedy that follows from the command alone.
-fn fixed_remedy(action: &Action, reason: Reason) -> Option<String> {
-    let remedy = match reason {
-        Reason::OutOfRange | Reason::NonFinite | Reason::UnknownParameter => {
-            return Some(format!("allowed: {}", action.allowed_values(reason)?));
+/// Remedy that names a command of the console or an option of the node.
+fn console_remedy(outcome: &Outcome, reason: Reason) -> Option<&'static str> {
+    let is_of_replay = outcome.is_of_replay();
+    Some(match (reason, outcome.command.action()) {
+        (Reason::AlreadyTorn, _) => "`ctl reset` restores it",
+        (Reason::NotGrabbed, _) => "`ctl grab` grabs it",
+        (Reason::GrabbedByOther, _) => "`ctl release --force` ends that grab",
+        (Reason::NoEffectHere, Action::Step { .. }) => "the node runs; `ctl pause` pauses it",
+        (
+            Reason::NoEffectHere,
+            Action::Pin { .. }
+            | Action::Unpin { .. }
+            | Action::Grab { .. }
+            | Action::Move { .. }
+            | Action::Release { .. },
+        ) if !is_of_replay => "the particle is frozen; `ctl reset` restores it",
+        (Reason::OutOfRange, Action::Step { count }) if is_of_replay && count > 0 => {
+            "the replay stands at its last snapshot; `ctl rewind` goes back"
         }
-        Reason::AlreadyTorn => "`ctl reset` restores it",
-        Reason::NotGrabbed => "`ctl grab` grabs it",
-        Reason::GrabbedByOther => "`ctl release --force` ends that grab",
-        Reason::NoEffectHere => missing_condition(action)?,
-        Reason::UnknownStep => {
+        (Reason::UnknownStep, _) => {
             "older states have made room for newer ones, or belong to another scene: a larger \
              `sim-node run --history` keeps more"
         }
-        Reason::InvalidState => "see the node's messages",
-        Reason::UnknownParticle
-        | Reason::UnknownConstraint
-        | Reason::UnknownAnchor
-        | Reason::UnknownCollider => return None,
-    };
-    Some(remedy.to_owned())
-}
-
-/// Condition under which a command has an effect.
-fn missing_condition(action: &Action) -> Option<&'static str> {
-    Some(match action {
-        Action::Step { .. } => "the node runs; `ctl pause` pauses it",
-        Action::Load { .. } => "it needs more memory than is available; see the node's messages",
-        Action::Rewind { .. } => "the node keeps no history; start it without --history 0",
-        Action::Pin { .. }
-        | Action::Unpin { .. }
-        | Action::Grab { .. }
-        | Action::Move { .. }
-        | Action::Release { .. } => "the particle is frozen; `ctl reset` restores it",
-        _ => return action.missing_condition(),
+        (Reason::InvalidState, _) => "see the node's messages",
+        _ => return None,
     })
 }
 
 #[cfg(test)]
 mod tests {
+    use sim_contract::Command;
+
     use super::*;
 
     #[test]
@@ -194,14 +155,9 @@ mod tests {
 
     #[test]
     fn a_step_of_a_node_that_runs_names_the_pause() {
-        let remedy = fixed_remedy(&Action::Step { count: 1 }, Reason::NoEffectHere);
-        assert_eq!(remedy.as_deref(), Some("the node runs; `ctl pause` pauses it"));
-    }
-
-    #[test]
-    fn allowed_indices_end_before_the_count() {
-        assert_eq!(allowed_indices(0), "it has none");
-        assert_eq!(allowed_indices(1), "allowed: 0");
-        assert_eq!(allowed_indices(168), "allowed: 0 to 167");
+        let command = Command::new(0, 1, Action::Step { count: 1 });
+        let outcome = Outcome::new(0, 1, command, Err(Reason::NoEffectHere));
+        let remedy = console_remedy(&outcome, Reason::NoEffectHere);
+        assert_eq!(remedy, Some("the node runs; `ctl pause` pauses it"));
     }
 }

@@ -30,7 +30,9 @@ mod reason;
 mod tear_cause;
 mod text;
 
-pub use action::{Action, ActionFields, GRAB_OVER_S_DEFAULT, KindFilter, RestoreContents};
+pub use action::{
+    Action, ActionFields, GRAB_OVER_S_DEFAULT, KindFilter, RestoreContents, allowed_indices,
+};
 pub use collider_shape::{ColliderFields, ColliderShape};
 pub use constraint_kind::ConstraintKind;
 pub use json::hash as json_hash;

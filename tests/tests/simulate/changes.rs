@@ -270,12 +270,19 @@ fn a_setting_that_every_scene_rejects_is_a_usage_error() {
 #[test]
 fn a_rejected_command_is_an_outcome_and_its_warning_names_the_allowed_values() {
     let sandbox = Sandbox::new();
-    let line = r#"{"step":100,"kind":"set","parameter":"wind","value":1}"#;
-    let commands = sandbox.write("b.jsonl", line);
+    let lines = r#"{"step":100,"kind":"set","parameter":"wind","value":1}
+        {"step":100,"kind":"pin","particle":9999}
+        {"step":100,"kind":"move_anchor","anchor":0,"translation":[0,0,0],"rotation":[0,0,0,1]}"#;
+    let commands = sandbox.write("b.jsonl", lines);
     let done = recorder(&sandbox, &["simulate", "rope", "--steps", "480", "--commands", &commands]);
     assert_eq!(done.code, Some(0), "{}", done.stderr);
-    let expected = "unknown_parameter: there is no such parameter (allowed: gravity, damping, ";
-    assert!(done.stderr.contains(expected), "{}", done.stderr);
+    for expected in [
+        "unknown_parameter: there is no such parameter (allowed: gravity, damping, ",
+        "unknown_particle: the scene has no such particle (allowed: 0 to ",
+        "unknown_anchor: the scene has no such anchor (it has none)",
+    ] {
+        assert!(done.stderr.contains(expected), "{}", done.stderr);
+    }
 }
 
 #[test]

@@ -72,6 +72,11 @@ impl Outcome {
         self.status == OutcomeStatus::Applied as u32
     }
 
+    /// Returns `true` if a replay has answered; see [`OUTCOME_FLAG_CONTROL`].
+    pub fn is_of_replay(&self) -> bool {
+        self.flags & OUTCOME_FLAG_CONTROL != 0
+    }
+
     /// Returns `true` if the owner released a particle of a client that is gone; see
     /// [`OUTCOME_FLAG_DISCONNECTED`].
     pub fn is_disconnection(&self) -> bool {

@@ -38,8 +38,8 @@ impl Action {
         }
     }
 
-    /// Returns the condition of the scene under which this action has an effect, in words, if it was rejected
-    /// for having none.
+    /// Returns the condition of the scene or its state under which this action has an effect, in words, if it was
+    /// rejected for having none.
     pub fn missing_condition(&self) -> Option<&'static str> {
         let is_bending = |parameter: &Text| parameter.as_str() == Parameter::Bending.name();
         match self {
@@ -56,6 +56,11 @@ impl Action {
             Self::DriveBody { .. } => Some(
                 "the collider is no body; the scene makes it one with body = { mass, inertia }",
             ),
+            Self::Pin { .. }
+            | Self::Unpin { .. }
+            | Self::Grab { .. }
+            | Self::Move { .. }
+            | Self::Release { .. } => Some("the particle is frozen; a reset restores it"),
             _ => None,
         }
     }
@@ -114,6 +119,15 @@ impl Action {
     }
 }
 
+/// Returns the allowed indices of `count` elements, as the remedy of an unknown one.
+pub fn allowed_indices(count: usize) -> String {
+    match count {
+        0 => "it has none".to_owned(),
+        1 => "allowed: 0".to_owned(),
+        count => format!("allowed: 0 to {}", count - 1),
+    }
+}
+
 /// The limit on the work of a step, for the parameters that it depends on.
 fn work(parameter: Parameter) -> String {
     match parameter {
@@ -162,6 +176,13 @@ mod tests {
         assert_eq!(values("damping"), "a number >= 0, or off for 0, no block");
         let blocks = "a number >= 0, for a generated block of the scene, counted from 0";
         assert_eq!(values("bending"), blocks);
+    }
+
+    #[test]
+    fn allowed_indices_end_before_the_count() {
+        assert_eq!(allowed_indices(0), "it has none");
+        assert_eq!(allowed_indices(1), "allowed: 0");
+        assert_eq!(allowed_indices(168), "allowed: 0 to 167");
     }
 
     #[test]
