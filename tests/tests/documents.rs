@@ -68,6 +68,14 @@ fn every_scene_in_a_document_is_accepted_without_a_warning_and_runs() {
 }
 
 #[test]
+fn the_program_in_the_readme_checks_the_outcome_of_its_command() {
+    let programs = blocks(README, "rust,no_run");
+    assert_eq!(programs.len(), 1);
+    let (_, after) = programs[0].1.split_once(".request(").unwrap();
+    assert!(after.contains(".is_applied()"), "a rejection is an outcome, not an error");
+}
+
+#[test]
 fn the_scene_reference_and_the_dictionary_of_the_fuzzer_name_every_key() {
     let sandbox = Sandbox::new();
     for table in [

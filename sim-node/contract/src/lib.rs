@@ -18,7 +18,11 @@
 //!     println!("step {} of {} particles", snapshot.header().step, snapshot.particles().len());
 //! }
 //! let outcome = client.request(Action::Pin { particle: 3 }, Duration::from_secs(1))?;
-//! println!("pinned at step {}", outcome.step);
+//! if outcome.is_applied() {
+//!     println!("pinned at step {}", outcome.step);
+//! } else {
+//!     println!("rejected: {}", outcome.reason_name());
+//! }
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
