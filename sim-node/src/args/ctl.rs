@@ -91,8 +91,8 @@ pub(crate) enum QueryVerb {
     /// Print the forces of a step on colliders, anchors and fixed particles
     ///
     /// In N, and torques in N m about the center of the collider or anchor: the contacts of particles with a
-    /// collider, and the pull of constraints on a pinned, grabbed or anchored particle. The node computes them only
-    /// while a program reads them, so a paused one has none until its next step.
+    /// collider, and the pull of constraints on a pinned, grabbed or anchored particle, without its contact with a
+    /// body. The node computes them only while a program reads them, so a paused one has none until its next step.
     #[command(after_help = "Examples:\n  sim-node ctl forces\n  sim-node ctl forces --json")]
     Forces,
     /// Print position, velocity, inverse mass and flags of particles
