@@ -22,7 +22,8 @@ use anyhow::{anyhow, bail};
 use recorder::{PartFile, Topic};
 use sim_contract::clock::{SECOND_NS, monotonic_ns, realtime_ns, sleep_until};
 use sim_contract::{
-    AttachError, Endpoint, LockstepError, SNAPSHOTS_BUFFERED, Stop, Tap, console, report_bus_errors,
+    AttachError, Domain, Endpoint, LockstepError, NodeAnswer, OwnerState, SNAPSHOTS_BUFFERED, Stop,
+    Tap, console, report_bus_errors,
 };
 
 use crate::cli::exit::{self, Exit};
@@ -50,6 +51,8 @@ const WAIT_MAX: Duration = Duration::from_millis(50);
 const OWNER_CHECK_NS: u64 = SECOND_NS / 5;
 /// Pause between two attempts to attach to a node that is not there yet.
 const ATTACH_PAUSE_NS: u64 = SECOND_NS / 50;
+/// Longest wait for a status, which a node publishes ten times a second.
+const ANSWER_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// Warning about SIGUSR1.
 const IGNORED_SIGNAL: &str = "warning: SIGUSR1 writes the memory of a black box, but --black-box is not given: the \
@@ -285,13 +288,27 @@ impl Recording {
         }
         let report = Report::new(&written, self.feed.skipped_count(), stop_reason.clone());
         if !report.has_files() && args.black_box.is_none() {
-            bail!(
-                "nothing was recorded ({stop_reason}): {endpoint} published no snapshot with a keyframe. A node that \
-                 a command has changed in a pause does so at its next step: `sim-node ctl step 1`"
-            );
+            bail!("nothing was recorded ({stop_reason}): {}", cause_of_no_state(endpoint)?);
         }
         Ok(report)
     }
+}
+
+/// Returns the reason why a node has published no complete state, with its cure.
+fn cause_of_no_state(endpoint: &Endpoint) -> anyhow::Result<String> {
+    let nodes = Domain::new(endpoint)?.nodes(ANSWER_TIMEOUT)?;
+    let node = nodes.into_iter().find(|node| node.name == endpoint.name());
+    Ok(match node.map(|node| (node.answer, node.process_id)) {
+        Some((NodeAnswer::Silent, process_id)) => {
+            OwnerState::Alive { process_id, endpoint: endpoint.clone() }.to_string()
+        }
+        Some(_) => format!(
+            "{endpoint} published no snapshot with a keyframe. A node that a command has changed in a pause does so \
+             at its next step: `sim-node ctl step 1{}`",
+            endpoint.options()
+        ),
+        None => format!("{endpoint} ended before it published a snapshot with a keyframe"),
+    })
 }
 
 #[cfg(test)]

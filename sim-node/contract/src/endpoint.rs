@@ -185,7 +185,7 @@ impl Endpoint {
     }
 
     /// Options that give another program this endpoint, for messages.
-    pub(crate) fn options(&self) -> String {
+    pub fn options(&self) -> String {
         let domain = self.domain.iter().map(|domain| format!(" --domain {domain}"));
         let name = (self.name != NAME_DEFAULT).then(|| format!(" --name {}", self.name));
         domain.chain(name).collect()

@@ -37,6 +37,20 @@ fn sigusr1_does_not_end_a_recording_without_a_black_box() {
 }
 
 #[test]
+fn a_recording_of_a_stopped_node_says_that_the_node_does_not_answer() {
+    let sandbox = Sandbox::new();
+    let node = Process::start_ready(Program::SimNode, &sandbox, &["run", "rope"]);
+    node.signal(Signal::STOP);
+    let args = ["record", "-o", &sandbox.path("run.mcap"), "--duration", "300ms"];
+    let recorded = Process::run(Program::Recorder, &sandbox, &args);
+    node.signal(Signal::CONT);
+    assert_eq!(recorded.code, Some(1), "{recorded:?}");
+    let expected = format!("process {} runs as 'sim' in domain ", node.id());
+    assert!(recorded.stderr.contains(&expected), "{recorded:?}");
+    assert!(recorded.stderr.contains("but does not answer (is it stopped"), "{recorded:?}");
+}
+
+#[test]
 fn a_recording_prints_its_progress_for_a_program() {
     let sandbox = Sandbox::new();
     let _node = Process::start_ready(Program::SimNode, &sandbox, &["run", "rope"]);
