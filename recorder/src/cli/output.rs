@@ -70,7 +70,10 @@ pub(crate) fn incomplete(recording: &str, part_path: &Path) -> String {
     if is_empty {
         format!("{recording} is incomplete; nothing of it was written")
     } else {
-        format!("{recording} is incomplete; its readable part is {}", path_text(part_path))
+        let part = path_text(part_path);
+        format!(
+            "{recording} is incomplete; what was written before is in {part} (see `recorder check {part}`)"
+        )
     }
 }
 

@@ -126,6 +126,7 @@ fn assert_ended_at_the_limit(finished: &Finished, file: &str) {
     for words in [&part, "File too large", "ulimit -f"] {
         assert!(finished.stderr.contains(words), "no \"{words}\" in: {}", finished.stderr);
     }
+    assert!(finished.stderr.contains(&format!("`recorder check {part}`")), "{}", finished.stderr);
     assert!(!Path::new(file).exists());
     assert!(std::fs::metadata(&part).unwrap().len() <= SIZE_LIMIT_BYTES);
     let mut log = LogReader::open(Path::new(&part)).unwrap();

@@ -191,7 +191,9 @@ fn a_recording_that_fails_names_the_cause_and_the_remedy() {
     page.send(&json!({ "type": "record" }));
     let failed = in_state(&mut page, "failed");
     let text = failed["text"].as_str().unwrap();
-    for part in ["its readable part is ", ".mcap.part", "File too large", "--recordings DIR"] {
+    for part in
+        ["what was written before is in ", ".mcap.part", "File too large", "--recordings DIR"]
+    {
         assert!(text.contains(part), "{part}: {text}");
     }
     assert_eq!(failed["name"], Value::Null);
