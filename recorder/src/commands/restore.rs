@@ -1,13 +1,15 @@
 //! `recorder restore`: puts a recorded state in place in a running node.
 
 use std::fmt;
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context, bail};
 use recorder::verification::Resimulation;
 use recorder::{
-    ContentSelection, Frame, FrameReader, LogReader, StatePlace, Wanted, find_state, recorded_scene,
+    ContentSelection, FindStateError, Frame, FrameReader, LogReader, StatePlace, Wanted,
+    find_state, recorded_scene,
 };
 use serde::Serialize;
 use sim_contract::{
@@ -15,7 +17,7 @@ use sim_contract::{
 };
 use sim_solver::SOLVER_VERSION;
 
-use crate::cli::damaged_input::lacks_state;
+use crate::cli::damaged_input::{lacks, lacks_state};
 use crate::cli::endpoint_args::EndpointArgs;
 use crate::cli::exit::Exit;
 use crate::cli::output::{self, AsJson, path_text};
@@ -99,7 +101,11 @@ pub(crate) fn run(args: &RestoreArgs) -> anyhow::Result<Exit> {
         (None, Some(time)) => Wanted::UpTo(step_at(time, log.run().rate_hz)),
         (None, None) => Wanted::Last,
     };
-    let place = find_state(log, wanted).map_err(|error| lacks_state(&args.file, error));
+    let rate_hz = log.run().rate_hz;
+    let place = find_state(log, wanted).map_err(|error| match args.time {
+        Some(time) => lacks_state_at(&args.file, (time, rate_hz), error),
+        None => lacks_state(&args.file, error),
+    });
     let place = place.with_context(|| path.clone())?;
     let state = read_state(&args.file, place, args.threads.count(), &stop).context(path)?;
     let given = GivenState {
@@ -139,6 +145,46 @@ fn check_scene<R: std::io::Read>(
 fn step_at(time: Duration, rate_hz: u32) -> u64 {
     let steps = time.as_nanos() * u128::from(rate_hz) / 1_000_000_000;
     u64::try_from(steps).unwrap_or(u64::MAX)
+}
+
+/// Returns the error of a recording without a complete state up to a time. It names the times that the recording has.
+fn lacks_state_at(
+    path: &Path,
+    (time, rate_hz): (Duration, u32),
+    error: FindStateError,
+) -> anyhow::Error {
+    let (end, steps) = match (error, complete_steps(path)) {
+        (FindStateError::Missing { end, .. }, Ok(Some(steps))) => (end, steps),
+        (error, _) => return lacks_state(path, error),
+    };
+    let problem = no_state_at(time, rate_hz, &steps);
+    lacks(path, &problem, end.as_ref())
+}
+
+fn no_state_at(time: Duration, rate_hz: u32, steps: &RangeInclusive<u64>) -> String {
+    let (first, last) = (*steps.start(), *steps.end());
+    // Rounded inwards, so that both times are accepted.
+    let thousandths = |step: u64| step as f64 * 1000.0 / f64::from(rate_hz);
+    let (from, to) = (thousandths(first).ceil() / 1000.0, thousandths(last).floor() / 1000.0);
+    format!(
+        "has no complete state up to {} (step {}; times count from step 0 of the run): its states are those from \
+         {from}s (step {first}) to {to}s (step {last})",
+        humantime::format_duration(time),
+        step_at(time, rate_hz)
+    )
+}
+
+/// Returns the steps from the first complete state of a recording to its last snapshot; `None` if it has none.
+fn complete_steps(path: &Path) -> anyhow::Result<Option<RangeInclusive<u64>>> {
+    let mut frames = FrameReader::new(LogReader::open(path)?);
+    let (mut first, mut last) = (None, 0);
+    while let Some(frame) = frames.next_frame()? {
+        if frame.own_keyframe().is_some() && frame.particles.is_some() {
+            first.get_or_insert(frame.row.step);
+        }
+        last = frame.row.step;
+    }
+    Ok(first.map(|first| first..=last))
 }
 
 /// Reads the state, and simulates it from the keyframe if it has none of its own.
@@ -211,4 +257,20 @@ fn check_outcome(outcome: &Outcome, state: &RecordedState) -> anyhow::Result<Rep
         );
     }
     Ok(Report { recorded_step: state.step, step, state_hash: format!("{state_hash:016x}") })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_time_before_the_recording_is_named_with_the_times_that_it_has() {
+        let text = no_state_at(Duration::from_secs(2), 240, &(1201..=2352));
+        assert_eq!(
+            text,
+            "has no complete state up to 2s (step 480; times count from step 0 of the run): its states are those \
+             from 5.005s (step 1201) to 9.8s (step 2352)"
+        );
+        assert!(step_at(Duration::from_millis(5005), 240) >= 1201);
+    }
 }

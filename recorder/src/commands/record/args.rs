@@ -67,7 +67,7 @@ pub(crate) struct RecordArgs {
     pub(super) lockstep: bool,
     #[command(flatten)]
     pub(super) split: SplitArgs,
-    /// Keep the last TIME in memory, such as 30s or 30, from 1s to 1h. Write it, and a second more, on
+    /// Keep the last TIME in memory, such as 30s, from 1s to 1h. Write it, and a second more, on
     /// `sim-node ctl mark`, on a tear, on a frozen particle and on SIGUSR1, each time into another file
     #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = black_box_span,
         conflicts_with_all = ["steps", "split_size", "split_duration"])]
@@ -158,10 +158,8 @@ fn flush_interval(text: &str) -> Result<Duration, String> {
     is_valid.then_some(interval).ok_or_else(|| "it must be a time from 100ms to 1h".to_owned())
 }
 
-/// Parses a time. A number without a unit is in seconds.
 fn black_box_span(text: &str) -> Result<Duration, String> {
-    let seconds = text.parse().map(Duration::from_secs);
-    let span = seconds.or_else(|_| parse::duration(text))?;
+    let span = parse::duration(text)?;
     let is_valid = BLACK_BOX_SPANS.contains(&span);
     is_valid.then_some(span).ok_or_else(|| "it must be a time from 1s to 1h".to_owned())
 }

@@ -124,6 +124,18 @@ fn a_load_ends_a_file_and_without_an_event_drops_what_was_before_it() {
 }
 
 #[test]
+fn the_time_of_a_black_box_has_a_unit_as_every_time() {
+    let sandbox = Sandbox::new();
+    for option in ["--black-box", "--duration", "--split-duration", "--flush-interval"] {
+        let args = ["record", option, "30"];
+        let refused = Process::run(Program::Recorder, &sandbox, &args);
+        assert_eq!(refused.code, Some(2), "{refused:?}");
+        let cure = "it must be a time with its unit, such as 2s or 500ms";
+        assert!(refused.stderr.contains(cure), "{refused:?}");
+    }
+}
+
+#[test]
 fn a_black_box_without_an_event_writes_nothing() {
     let sandbox = Sandbox::new();
     let _node = node(&sandbox, &["run", "curtain"]);
