@@ -62,12 +62,12 @@ pub(crate) struct SimulateArgs {
     #[arg(long, value_name = "FILE")]
     commands: Option<String>,
     /// Leave out the command with this index in /outcomes of the recording. Can be repeated
-    #[arg(long, value_name = "INDEX", conflicts_with_all = ["steps", "commands"],
+    #[arg(long, value_name = "INDEX", conflicts_with = "commands",
         allow_hyphen_values = true, value_parser = whole_number)]
     drop: Vec<u64>,
     /// Change a parameter from this step of the recording on. Can be repeated. PARAMETER is that of `ctl set`, such as
     /// damping, compliance.shear for one kind of constraint, or bending.1 for one generated block
-    #[arg(long, value_name = "STEP:PARAMETER=VALUE", conflicts_with = "steps",
+    #[arg(long, value_name = "STEP:PARAMETER=VALUE",
         allow_hyphen_values = true, value_parser = parse_setting)]
     set: Vec<TimedCommand>,
     /// Record the forces on colliders, anchors and fixed particles in each step, too (/forces)
@@ -97,6 +97,9 @@ struct Summary {
 }
 
 pub(crate) fn run(args: &SimulateArgs) -> anyhow::Result<Exit> {
+    if let Some(problem) = args.misplaced_change() {
+        with_usage(&clap::Error::raw(ErrorKind::ArgumentConflict, problem));
+    }
     let stop = Stop::install()?;
     match args.steps {
         Some(steps) => run_scene(args, steps, &stop),
@@ -228,6 +231,30 @@ fn run_job<E: From<WriteError> + Into<anyhow::Error>>(
 impl SimulateArgs {
     fn commands(&self, stop: &Stop) -> anyhow::Result<Option<CommandSource>> {
         self.commands.as_deref().map(|source| CommandSource::load(source, stop)).transpose()
+    }
+
+    /// Returns the problem of --drop or --set without a recording to change, or with the steps of a scene.
+    fn misplaced_change(&self) -> Option<String> {
+        let option = match (self.drop.is_empty(), self.set.is_empty()) {
+            (true, true) => return None,
+            (true, false) => "--set",
+            (false, _) => "--drop",
+        };
+        let scene = &self.scene;
+        if !is_recording(scene) {
+            let steps = self.steps.unwrap_or(480);
+            return Some(format!(
+                "{option} changes a recording (ending in .mcap), and {scene} is a scene. Record it first: \
+                 `recorder simulate {scene} --steps {steps} -o run.mcap`, then `recorder simulate run.mcap {option} \
+                 ...`\n"
+            ));
+        }
+        self.steps.map(|_| {
+            format!(
+                "{option} changes {scene} from one of its states to its last step, and --steps begins at step 0 of its \
+                 scene: leave out --steps\n"
+            )
+        })
     }
 
     fn has_changes(&self) -> bool {

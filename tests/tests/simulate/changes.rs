@@ -251,6 +251,27 @@ fn changes_without_a_place_in_the_recording_are_refused() {
 }
 
 #[test]
+fn a_change_without_a_recording_says_how_to_make_one() {
+    let sandbox = Sandbox::new();
+    for (args, expected) in [
+        (
+            &["curtain", "--steps", "48", "--set", "12:damping=1"][..],
+            "--set changes a recording (ending in .mcap), and curtain is a scene. Record it first: `recorder \
+             simulate curtain --steps 48 -o run.mcap`",
+        ),
+        (
+            &["curtain", "--drop", "3"],
+            "--drop changes a recording (ending in .mcap), and curtain is",
+        ),
+        (&["run.mcap", "--steps", "48", "--set", "12:damping=1"], "leave out --steps"),
+    ] {
+        let refused = recorder(&sandbox, &[&["simulate"], args].concat());
+        assert_eq!(refused.code, Some(2), "{refused:?}");
+        assert!(refused.stderr.contains(expected), "{refused:?}");
+    }
+}
+
+#[test]
 fn a_setting_that_every_scene_rejects_is_a_usage_error() {
     let sandbox = Sandbox::new();
     let run = simulate_rope(&sandbox, "a", "");
