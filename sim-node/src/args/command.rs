@@ -70,6 +70,9 @@ pub(crate) enum CommandVerb {
         pose: PoseArgs,
     },
     /// Move a collider to a pose by the end of the next step
+    ///
+    /// The whole way is made within this one step, with the speed that this implies. For a slow motion, send a pose for
+    /// each part of the way.
     #[command(
         allow_negative_numbers = true,
         after_help = "Example: sim-node ctl move-collider 0 0 0.1 -0.2 --rotation 0 0.6 0 0.8"
