@@ -23,7 +23,7 @@ const RESTORE_ENDS: Ends = Ends {
     errors: &[
         "no node runs as",
         "but the node runs a scene with the hash",
-        "has no complete state of step",
+        "has no complete state",
     ],
     needs_no_signal: true,
 };
