@@ -6,7 +6,6 @@ mod forces;
 pub(crate) mod loaded_scene;
 pub(crate) mod lockstep;
 pub(crate) mod membership;
-mod remedy;
 pub(crate) mod repeats;
 pub(crate) mod request;
 pub(crate) mod restoring;

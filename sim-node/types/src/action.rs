@@ -11,7 +11,6 @@ use crate::json::non_finite::{number, optional_number, rotation, vector};
 use crate::parameter::ParameterValue;
 use crate::text::Text;
 
-pub use allowed_values::allowed_indices;
 pub use fields::ActionFields;
 pub use kind_filter::KindFilter;
 use kind_filter::kind_or_all;

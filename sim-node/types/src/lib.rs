@@ -30,9 +30,7 @@ mod reason;
 mod tear_cause;
 mod text;
 
-pub use action::{
-    Action, ActionFields, GRAB_OVER_S_DEFAULT, KindFilter, RestoreContents, allowed_indices,
-};
+pub use action::{Action, ActionFields, GRAB_OVER_S_DEFAULT, KindFilter, RestoreContents};
 pub use collider_shape::{ColliderFields, ColliderShape};
 pub use constraint_kind::ConstraintKind;
 pub use json::hash as json_hash;
@@ -42,7 +40,7 @@ pub use method::Method;
 pub use parameter::{OffMeaning, PARAMETERS, Parameter, ParameterInfo, ParameterValue, ValueForm};
 pub use parameter_values::{BlockValue, ParameterValues, PerKind, SETTINGS_COUNT, Setting};
 pub use particle_flags::ParticleFlags;
-pub use range::{COORDINATE_MAX, NumberRange};
+pub use range::{COORDINATE_MAX, NumberRange, allowed_indices};
 pub use reason::Reason;
 pub use tear_cause::TearCause;
 pub use text::printable::{printable, printable_line};

@@ -1,4 +1,4 @@
-//! Ranges of numbers, with their text for error messages.
+//! Ranges of numbers and indices, with their text for error messages.
 
 /// Largest coordinate in a scene or command, in m. f32 resolves 1 m at this distance.
 pub const COORDINATE_MAX: f32 = 1e7;
@@ -56,9 +56,25 @@ impl NumberRange {
     }
 }
 
+/// Returns the allowed indices of `count` elements, as the remedy of an unknown one.
+pub fn allowed_indices(count: usize) -> String {
+    match count {
+        0 => "it has none".to_owned(),
+        1 => "allowed: 0".to_owned(),
+        count => format!("allowed: 0 to {}", count - 1),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn allowed_indices_end_before_the_count() {
+        assert_eq!(allowed_indices(0), "it has none");
+        assert_eq!(allowed_indices(1), "allowed: 0");
+        assert_eq!(allowed_indices(168), "allowed: 0 to 167");
+    }
 
     #[test]
     fn the_ends_of_a_range_belong_to_it_unless_excluded() {

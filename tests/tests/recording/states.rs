@@ -114,7 +114,7 @@ fn the_state_of_a_paused_node_is_complete_until_a_command_changes_it() {
     let args = ["state", "-o", &file, "--overwrite"];
     let refused = Process::run(Program::Recorder, &sandbox, &args);
     assert_eq!(refused.code, Some(1));
-    assert!(refused.stderr.contains("`sim-node ctl step 1`"), "{}", refused.stderr);
+    assert!(refused.stderr.contains("`sim-node ctl step 1 --domain "), "{}", refused.stderr);
 }
 
 #[test]

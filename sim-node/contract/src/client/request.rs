@@ -1,5 +1,7 @@
 //! Sending of commands and matching of their outcomes.
 
+mod remedy;
+
 use std::collections::VecDeque;
 use std::fmt;
 use std::time::Duration;

@@ -119,15 +119,6 @@ impl Action {
     }
 }
 
-/// Returns the allowed indices of `count` elements, as the remedy of an unknown one.
-pub fn allowed_indices(count: usize) -> String {
-    match count {
-        0 => "it has none".to_owned(),
-        1 => "allowed: 0".to_owned(),
-        count => format!("allowed: 0 to {}", count - 1),
-    }
-}
-
 /// The limit on the work of a step, for the parameters that it depends on.
 fn work(parameter: Parameter) -> String {
     match parameter {
@@ -176,13 +167,6 @@ mod tests {
         assert_eq!(values("damping"), "a number >= 0, or off for 0, no block");
         let blocks = "a number >= 0, for a generated block of the scene, counted from 0";
         assert_eq!(values("bending"), blocks);
-    }
-
-    #[test]
-    fn allowed_indices_end_before_the_count() {
-        assert_eq!(allowed_indices(0), "it has none");
-        assert_eq!(allowed_indices(1), "allowed: 0");
-        assert_eq!(allowed_indices(168), "allowed: 0 to 167");
     }
 
     #[test]
