@@ -158,12 +158,13 @@ fn the_iceoryx2_python_package_reads_bends_and_the_bending_of_a_block() {
     }
 }
 
-/// A simulated and a live recording attach the mesh of the bust, named by the hash of its content.
+/// A simulated recording, a live one and its completion attach the mesh of the bust, named by the hash of its content.
 #[test]
 #[ignore = "needs Python"]
 fn the_stock_python_reader_finds_the_mesh_of_a_collider() {
     let sandbox = Sandbox::new();
-    let (simulated, live) = (sandbox.path("simulated.mcap"), sandbox.path("live.mcap"));
+    let [simulated, live, completed] =
+        ["simulated", "live", "completed"].map(|name| sandbox.path(&format!("{name}.mcap")));
     let args = ["simulate", "covered-bust", "--steps", "1", "-o", &simulated];
     Process::run(Program::Recorder, &sandbox, &args).success();
     let node = Process::start_ready(Program::SimNode, &sandbox, &["run", "covered-bust"]);
@@ -173,7 +174,8 @@ fn the_stock_python_reader_finds_the_mesh_of_a_collider() {
     let scene = Scene::from_toml(builtin::text("covered-bust").unwrap(), "covered-bust").unwrap();
     let meshes = scene.collider_meshes();
     let mesh = meshes.values().next().unwrap();
-    for file in [simulated, live] {
+    Process::run(Program::Recorder, &sandbox, &["simulate", &live, "-o", &completed]).success();
+    for file in [simulated, live, completed] {
         let read = python(&sandbox, "read_attachments.py", &[&file]);
         let attachments = read["attachments"].as_object().unwrap();
         assert_eq!(attachments.len(), 1 + meshes.len(), "{:?}", attachments.keys());

@@ -288,27 +288,35 @@ impl Recording {
         }
         let report = Report::new(&written, self.feed.skipped_count(), stop_reason.clone());
         if !report.has_files() && args.black_box.is_none() {
-            bail!("nothing was recorded ({stop_reason}): {}", cause_of_no_state(endpoint)?);
+            bail!("nothing was recorded ({stop_reason}): {}", cause_of_no_state(endpoint));
         }
         Ok(report)
     }
 }
 
 /// Returns the reason why a node has published no complete state, with its cure.
-fn cause_of_no_state(endpoint: &Endpoint) -> anyhow::Result<String> {
-    let nodes = Domain::new(endpoint)?.nodes(ANSWER_TIMEOUT)?;
-    let node = nodes.into_iter().find(|node| node.name == endpoint.name());
-    Ok(match node.map(|node| (node.answer, node.process_id)) {
+fn cause_of_no_state(endpoint: &Endpoint) -> String {
+    let nodes = Domain::new(endpoint).map(|domain| domain.nodes(ANSWER_TIMEOUT));
+    let node = match nodes {
+        Ok(Ok(nodes)) => nodes.into_iter().find(|node| node.name == endpoint.name()),
+        // The domain cannot be read, so the node is not known to be silent or gone.
+        Ok(Err(_)) | Err(_) => return awaits_step(endpoint),
+    };
+    match node.map(|node| (node.answer, node.process_id)) {
         Some((NodeAnswer::Silent, process_id)) => {
             OwnerState::Alive { process_id, endpoint: endpoint.clone() }.to_string()
         }
-        Some(_) => format!(
-            "{endpoint} published no snapshot with a keyframe. A node that a command has changed in a pause does so \
-             at its next step: `sim-node ctl step 1{}`",
-            endpoint.options()
-        ),
+        Some(_) => awaits_step(endpoint),
         None => format!("{endpoint} ended before it published a snapshot with a keyframe"),
-    })
+    }
+}
+
+fn awaits_step(endpoint: &Endpoint) -> String {
+    format!(
+        "{endpoint} published no snapshot with a keyframe. A node that a command has changed in a pause does so at \
+         its next step: `sim-node ctl step 1{}`",
+        endpoint.options()
+    )
 }
 
 #[cfg(test)]

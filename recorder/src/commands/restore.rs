@@ -103,7 +103,7 @@ pub(crate) fn run(args: &RestoreArgs) -> anyhow::Result<Exit> {
     };
     let rate_hz = log.run().rate_hz;
     let place = find_state(log, wanted).map_err(|error| match args.time {
-        Some(time) => lacks_state_at(&args.file, (time, rate_hz), error),
+        Some(time) => lacks_state_at(&args.file, (time, rate_hz), error, &stop),
         None => lacks_state(&args.file, error),
     });
     let place = place.with_context(|| path.clone())?;
@@ -152,8 +152,9 @@ fn lacks_state_at(
     path: &Path,
     (time, rate_hz): (Duration, u32),
     error: FindStateError,
+    stop: &Stop,
 ) -> anyhow::Error {
-    let (end, steps) = match (error, complete_steps(path)) {
+    let (end, steps) = match (error, complete_steps(path, stop)) {
         (FindStateError::Missing { end, .. }, Ok(Some(steps))) => (end, steps),
         (error, _) => return lacks_state(path, error),
     };
@@ -165,7 +166,9 @@ fn no_state_at(time: Duration, rate_hz: u32, steps: &RangeInclusive<u64>) -> Str
     let (first, last) = (*steps.start(), *steps.end());
     // Rounded inwards, so that both times are accepted.
     let thousandths = |step: u64| step as f64 * 1000.0 / f64::from(rate_hz);
-    let (from, to) = (thousandths(first).ceil() / 1000.0, thousandths(last).floor() / 1000.0);
+    let from = thousandths(first).ceil() / 1000.0;
+    // A later time than that of the last state is accepted, too.
+    let to = (thousandths(last).floor() / 1000.0).max(from);
     format!(
         "has no complete state up to {} (step {}; times count from step 0 of the run): its states are those from \
          {from}s (step {first}) to {to}s (step {last})",
@@ -175,8 +178,8 @@ fn no_state_at(time: Duration, rate_hz: u32, steps: &RangeInclusive<u64>) -> Str
 }
 
 /// Returns the steps from the first complete state of a recording to its last snapshot; `None` if it has none.
-fn complete_steps(path: &Path) -> anyhow::Result<Option<RangeInclusive<u64>>> {
-    let mut frames = FrameReader::new(LogReader::open(path)?);
+fn complete_steps(path: &Path, stop: &Stop) -> anyhow::Result<Option<RangeInclusive<u64>>> {
+    let mut frames = FrameReader::new(LogReader::open_until(path, stop)?);
     let (mut first, mut last) = (None, 0);
     while let Some(frame) = frames.next_frame()? {
         if frame.own_keyframe().is_some() && frame.particles.is_some() {
@@ -272,5 +275,7 @@ mod tests {
              from 5.005s (step 1201) to 9.8s (step 2352)"
         );
         assert!(step_at(Duration::from_millis(5005), 240) >= 1201);
+        let of_one = no_state_at(Duration::from_secs(2), 240, &(1201..=1201));
+        assert!(of_one.ends_with("from 5.005s (step 1201) to 5.005s (step 1201)"), "{of_one}");
     }
 }

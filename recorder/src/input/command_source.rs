@@ -85,8 +85,9 @@ impl CommandSource {
                 state.step
             );
         }
-        // The first state of a recording has the effect of the commands of its own step.
-        self.commands.retain(|command| command.step > start.step);
+        // A state has the effect of the commands up to its own step.
+        let first = start.step.max(state.step);
+        self.commands.retain(|command| command.step > first);
         Ok(self.commands)
     }
 }
@@ -106,10 +107,11 @@ mod tests {
     use std::fs;
 
     use recorder::{Closing, LogOptions, LogWriter, RunDescription, Up};
+    use sim_contract::Action;
 
     use super::*;
 
-    fn recording(path: &Path, outcome_count: u64) -> CommandSource {
+    fn recording(path: &Path, outcome_count: u64, command_steps: &[u64]) -> CommandSource {
         let description = RunDescription {
             run_id: 1,
             epoch_ns: 0,
@@ -129,15 +131,42 @@ mod tests {
             LogWriter::create(Vec::new(), LogOptions::default(), &description, b"", 0).unwrap();
         let row = StepRow { step: 120, outcome_count, ..StepRow::default() };
         log.write(&Message::Step(row), 0).unwrap();
+        for (index, step) in (0..).zip(command_steps) {
+            let row = OutcomeRow {
+                step: *step,
+                client_id: 1,
+                sequence: index,
+                index,
+                action: Action::Pause,
+                status: "applied".to_owned(),
+                reason: String::new(),
+                disconnected: false,
+                new_run: false,
+            };
+            log.write(&Message::Outcome(row), 0).unwrap();
+        }
         fs::write(path, log.finish(&Closing::default()).unwrap()).unwrap();
         CommandSource::load(&path.display().to_string(), &Stop::default()).unwrap()
+    }
+
+    #[test]
+    fn commands_up_to_the_first_state_of_a_simulation_are_left_out() {
+        let path = std::env::temp_dir().join(format!("between-{}.mcap", std::process::id()));
+        let after = |step| {
+            let state = Start { step, outcome_count: 5 };
+            let commands = recording(&path, 0, &[120, 130, 200, 210]).after(state).unwrap();
+            commands.iter().map(|command| command.step).collect::<Vec<_>>()
+        };
+        let found = [0, 130, 200, 210].map(after);
+        fs::remove_file(&path).unwrap();
+        assert_eq!(found, [vec![130, 200, 210], vec![200, 210], vec![210], vec![]]);
     }
 
     #[test]
     fn a_recording_that_starts_after_some_commands_of_the_simulation_is_refused() {
         let path = std::env::temp_dir().join(format!("late-{}.mcap", std::process::id()));
         let after = |outcome_count, step, known_count| {
-            recording(&path, outcome_count).after(Start { step, outcome_count: known_count })
+            recording(&path, outcome_count, &[]).after(Start { step, outcome_count: known_count })
         };
         for (outcome_count, step, known_count) in [(0, 0, 0), (3, 120, 3), (3, 200, 5), (3, 60, 3)]
         {

@@ -277,7 +277,7 @@ fn a_shape_that_starts_within_the_distance_of_a_mesh_causes_a_warning() {
     let near = format!("{SHEET}{}", plate(-0.015, false));
     let [warning] = &warnings(&near)[..] else { panic!("{:?}", warnings(&near)) };
     let expected = "5 particles start within the distance of collider 0, a mesh; particle 20 is 0.005 m too near: the \
-                    first step pushes it away at once; move the shape, or use a distance of less than 0.02 m";
+                    first step pushes it away at once; move the shape, or use a distance of at most 0.015 m";
     assert_eq!(warning, expected);
     for height in [-0.02, -0.0199] {
         assert_eq!(warnings(&format!("{SHEET}{}", plate(height, false))), Vec::<String>::new());

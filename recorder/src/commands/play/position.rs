@@ -109,7 +109,7 @@ impl Position {
     /// far as they are known.
     pub(super) fn agrees_with(&mut self, other: &mut Self, step: u64) -> bool {
         let are_same_colliders = match (&self.colliders, &other.colliders) {
-            (Some(one), Some(two)) => one.colliders == two.colliders,
+            (Some(one), Some(two)) => one.states() == two.states(),
             _ => true,
         };
         are_same_colliders

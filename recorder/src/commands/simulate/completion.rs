@@ -8,7 +8,7 @@ use anyhow::{Context, bail};
 use recorder::verification::{Resimulation, SnapshotFinding};
 use recorder::{
     Closing, Frame, FrameReader, LogEnd, LogOptions, LogReader, LogWriter, Message, ReadError,
-    Topic, WriteError, scene_to_simulate,
+    SceneColliders, Topic, WriteError, scene_to_simulate,
 };
 use sim_solver::Scene;
 
@@ -118,7 +118,9 @@ impl<R: Read> Completion<R> {
     ) -> Result<LogWriter<W>, WriteError> {
         let log = self.frames.log();
         let options = LogOptions { selection: log.selection().with_all_particles(), ..options };
-        LogWriter::create(out, options, log.run(), log.scene(), log_time_ns)
+        let mut out = LogWriter::create(out, options, log.run(), log.scene(), log_time_ns)?;
+        out.describe_colliders(&SceneColliders::new(&self.scene))?;
+        Ok(out)
     }
 
     /// Simulates up to a snapshot and compares everything that the recording has of it. Returns `false`

@@ -36,7 +36,11 @@ impl Client {
         let count = match outcome.reason()? {
             Reason::UnknownParticle => self.load_header(timeout)?.particle_count as usize,
             Reason::UnknownConstraint => self.load_header(timeout)?.count as usize,
-            Reason::UnknownCollider => self.colliders(timeout).ok()?.colliders.len(),
+            Reason::UnknownCollider => {
+                let colliders = self.colliders(timeout).ok()?;
+                // Without an answer, the list is that of no run.
+                (colliders.header.run_id != 0).then_some(colliders.colliders.len())?
+            }
             _ => return outcome.remedy(),
         };
         Some(allowed_indices(count))

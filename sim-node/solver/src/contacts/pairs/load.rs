@@ -209,13 +209,14 @@ impl LoadPairs {
 impl PairMasks {
     pub(super) fn new(mut pairs: Vec<[u32; 2]>, slot_count: usize) -> Self {
         pairs.sort_unstable_by_key(|pair| (pair.map(|one| one / TILE_LENGTH), *pair));
+        pairs.dedup();
         let mut masks = Self::default();
         masks.enter(&pairs, slot_count.div_ceil(TILE));
         masks
     }
 
     /// Enters pairs that ascend by their tiles.
-    #[allow(clippy::cast_possible_truncation, reason = "at most 128 for each of 2^24 particles")]
+    #[allow(clippy::cast_possible_truncation, reason = "memory ends long before 2^32 tiles")]
     fn enter(&mut self, pairs: &[[u32; 2]], tile_count: usize) {
         let mut rest = pairs.iter().peekable();
         for slot_tile in 0..tile_count as u32 {

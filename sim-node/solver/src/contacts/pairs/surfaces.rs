@@ -1,8 +1,8 @@
 //! Contacts of particles with the triangles of cloths.
 //!
 //! A particle touches each layer of cloth at the point that is nearest to it: a local minimum of its distance from
-//! the triangles. These points are found for the paths that the particles are about to take. In each substep they
-//! move on across edges and around corners, so that a particle slides over the triangles without feeling them.
+//! the triangles that it may touch. These points are found for the paths that the particles are about to take. In each
+//! substep they move on across edges and around corners, so that a particle slides over the triangles without feeling them.
 
 mod candidate;
 mod contact;

@@ -78,8 +78,9 @@ pub(super) fn within_distance(scene: &Scene, model: &Model) -> Vec<String> {
         };
         Some(format!(
             "{count} within the distance of collider {index}, a mesh; particle {particle} is {} {unit} too near: the \
-             first step pushes it away at once; move the shape, or use a distance of less than {distance} {unit}",
+             first step pushes it away at once; move the shape, or use a distance of at most {} {unit}",
             three_digits(f64::from(*depth)),
+            three_digits(f64::from(distance - depth)),
             unit = scene.unit
         ))
     };

@@ -12,7 +12,7 @@ use crate::kernels::vectors::{difference, dot, scaled, sum};
 const ROUNDING: f32 = 1e-4;
 
 /// Finds, for each particle and triangle in `pairs`, the part of the triangle with the nearest point, if that is a local
-/// minimum of the distance and comes near the particle.
+/// minimum of the distance from the triangles that the particle may touch, and comes near the particle.
 pub(super) struct NearbyWork<'a> {
     pub(super) surface: &'a Surface,
     pub(super) load_pairs: &'a LoadPairs,
