@@ -18,13 +18,14 @@ use sim_contract::{Client as Reader, ParticleFlags, ParticleState};
 
 use foxglove_client::Client;
 
-/// A paused node with the curtain scene, and a bridge that serves it.
+/// A paused node with the curtain scene, and a bridge that serves it. They end in the order of the fields: a bridge
+/// that outlives its domain would make it again.
 struct Setup {
-    sandbox: Sandbox,
-    _node: Process,
-    _bridge: Process,
     url: String,
     node: Reader,
+    _bridge: Process,
+    _node: Process,
+    sandbox: Sandbox,
 }
 
 impl Setup {
@@ -36,7 +37,7 @@ impl Setup {
         let mut bridge = Process::start(Program::ViewerBridge, &sandbox, &args);
         let url = bridge.wait_for_line("foxglove ws://").replace("foxglove ", "");
         let node = Reader::attach(&sandbox.endpoint()).unwrap();
-        Self { sandbox, _node: process, _bridge: bridge, url, node }
+        Self { url, node, _bridge: bridge, _node: process, sandbox }
     }
 
     /// Returns the newest state.

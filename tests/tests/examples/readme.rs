@@ -14,8 +14,8 @@ const CARGO: &str = r#"cargo() {
 /// A path of the README, in a folder of its own, beside a node.
 struct TenMinutes {
     text: &'static str,
-    sandbox: Sandbox,
     _node: Process,
+    sandbox: Sandbox,
 }
 
 impl TenMinutes {
@@ -24,7 +24,7 @@ impl TenMinutes {
         let text = text.split("\n## ").next().unwrap();
         let sandbox = Sandbox::new();
         let node = Process::start_ready(Program::SimNode, &sandbox, &["run", "pendulum"]);
-        Self { text, sandbox, _node: node }
+        Self { text, _node: node, sandbox }
     }
 
     /// Returns the contents of the fenced blocks of a language.

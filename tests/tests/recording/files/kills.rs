@@ -30,10 +30,10 @@ fn steps(file: &str) -> Vec<u64> {
 
 /// A paused node that takes steps on request, and a recorder that divides them into files.
 struct Session {
-    sandbox: Sandbox,
-    _node: Process,
     client: Client,
     steps: u64,
+    _node: Process,
+    sandbox: Sandbox,
 }
 
 impl Session {
