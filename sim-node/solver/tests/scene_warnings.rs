@@ -282,6 +282,9 @@ fn a_shape_that_starts_within_the_distance_of_a_mesh_causes_a_warning() {
     for height in [-0.02, -0.0199] {
         assert_eq!(warnings(&format!("{SHEET}{}", plate(height, false))), Vec::<String>::new());
     }
+    // Within the rounding of a mesh without a distance.
+    let on = plate(-1e-9, false).replace("distance = 0.02", "distance = 0");
+    assert_eq!(warnings(&format!("{SHEET}{on}")), Vec::<String>::new());
 }
 
 #[test]

@@ -46,7 +46,6 @@ pub struct ColliderRow {
 pub struct ColliderDetails {
     /// Meshes only: name of the attachment with the triangles, an OBJ file with the scale applied.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(with = "Option<String>")]
     pub path: Option<String>,
     /// Meshes only: true if the triangles enclose a solid, which particles inside leave.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -84,10 +84,11 @@ impl Scene {
         let read_mesh = |mesh: &str| {
             let path = folder.join(mesh);
             read_file(&path).map_err(|problem| {
-                format!(
-                    "{problem} (a path is relative to the scene, so this is {})",
-                    path.display()
-                )
+                if Path::new(mesh).is_absolute() {
+                    return problem;
+                }
+                let path = path.display();
+                format!("{problem} (a path is relative to the scene, so this is {path})")
             })
         };
         Ok(Self::from_toml_with_files(&text, source, &read_mesh)?)
@@ -112,6 +113,24 @@ mod tests {
                 )
             );
         }
+    }
+
+    #[test]
+    fn a_mesh_that_cannot_be_read_is_named_with_its_folder() {
+        let error = |mesh: &str| {
+            let scene = SCENE.replace("a.obj", mesh);
+            let read = |path: &Path| {
+                let is_scene = path == Path::new("some/scene.toml");
+                if is_scene { Ok(scene.clone()) } else { Err("no such file".to_owned()) }
+            };
+            Scene::load("some/scene.toml", &read).unwrap_err().to_string()
+        };
+        let relative = error("a.obj");
+        let expected =
+            "a.obj: no such file (a path is relative to the scene, so this is some/a.obj)";
+        assert!(relative.contains(expected), "{relative}");
+        let absolute = error("/a.obj");
+        assert!(absolute.contains("/a.obj: no such file (allowed"), "{absolute}");
     }
 
     #[test]

@@ -64,7 +64,8 @@ pub(super) fn within_distance(scene: &Scene, model: &Model) -> Vec<String> {
     let is_free = free(scene, model);
     let sentence = |(index, collider): (usize, &SceneCollider)| {
         let ColliderGeometry::Mesh { distance, .. } = collider.shape else { return None };
-        let mut mesh = MeshAtLoad::new(index, collider)?;
+        // Without a distance, a particle on the mesh is too near by its rounding.
+        let mut mesh = MeshAtLoad::new(index, collider).filter(|_| distance > 0.0)?;
         let free = model.particles.iter().enumerate().filter(|(particle, _)| is_free[*particle]);
         let depths = free.filter_map(|(particle, one)| {
             let depth = mesh.depth_within_distance(Vec3::from_array(one.position))?;
