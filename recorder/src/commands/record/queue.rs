@@ -9,13 +9,17 @@ use sim_contract::Action;
 
 use super::load::RunHeader;
 
-/// Bytes that wake the writing thread before its time: those of a chunk. To wake it for each snapshot takes
-/// longer than to write a small one.
-const WAKE_SIZE_BYTES: usize = 1 << 20;
+/// Bytes that wake the writing thread before its time: those of some chunks. Waking it for each snapshot takes
+/// longer than writing a small one, and waking it for each chunk takes a tenth of all processor time.
+const WAKE_SIZE_BYTES: usize = 4 << 20;
 /// The part of the limit that wakes the writing thread, if that is less.
 const WAKE_PART: usize = 4;
 /// Most spare buffers. A chunk of small snapshots returns more of them, whose memory is freed.
-const SPARE_BUFFERS_MAX: usize = 8;
+const SPARE_BUFFERS_MAX: usize = 32;
+/// Spare buffers of any size: the writing thread returns one while the next snapshot arrives.
+const SPARE_BUFFERS_MIN: usize = 2;
+/// Most bytes of more spare buffers: those that wake the writing thread, and those of its open chunk.
+const SPARE_SIZE_BYTES_MAX: usize = 2 * WAKE_SIZE_BYTES;
 
 /// One or two messages to write.
 #[derive(Debug, Clone, PartialEq)]
@@ -171,7 +175,12 @@ impl Queue {
     /// Gives a buffer back, after its snapshot was written.
     pub(crate) fn add_spare(&self, buffer: ParticleBuffer) {
         let mut state = self.lock();
-        if state.spare.len() < SPARE_BUFFERS_MAX {
+        let size_bytes = |buffer: &ParticleBuffer| size_of_val(buffer.particles());
+        let spare_bytes: usize = state.spare.iter().map(size_bytes).sum();
+        let count = state.spare.len();
+        let has_room =
+            count < SPARE_BUFFERS_MAX && spare_bytes + size_bytes(&buffer) <= SPARE_SIZE_BYTES_MAX;
+        if count < SPARE_BUFFERS_MIN || has_room {
             state.spare.push(buffer);
         }
     }
@@ -366,8 +375,8 @@ mod tests {
     }
 
     #[test]
-    fn a_chunk_is_due_and_so_is_a_part_of_a_small_limit() {
-        for (limit_bytes, wakes_at) in [(100 << 20, 33), (1 << 20, 9)] {
+    fn some_chunks_are_due_and_so_is_a_part_of_a_small_limit() {
+        for (limit_bytes, wakes_at) in [(100 << 20, 130), (1 << 20, 9)] {
             let queue = Queue::new(limit_bytes);
             for step in 0..wakes_at {
                 queue.push(snapshot(step));
@@ -378,9 +387,9 @@ mod tests {
         }
     }
 
-    /// In nearly every round, the thread waits before the chunk is due.
+    /// In nearly every round, the thread waits before the snapshots are due.
     #[test]
-    fn the_waiting_thread_wakes_for_a_chunk_and_for_the_end() {
+    fn the_waiting_thread_wakes_for_some_snapshots_and_for_the_end() {
         let queue = Arc::new(Queue::new(1 << 20));
         let waiting = Arc::clone(&queue);
         let (woken, wakes) = channel();
@@ -398,6 +407,19 @@ mod tests {
         }
         queue.close();
         assert_eq!(wakes.recv_timeout(DEADLINE), Err(RecvTimeoutError::Disconnected));
+    }
+
+    #[test]
+    fn spare_buffers_are_limited_in_number_and_size() {
+        for (particle_count, kept) in [(10, 32), (40_000, 6), (1_000_000, 2)] {
+            let queue = Queue::new(1000);
+            let particles = vec![ParticleState::default(); particle_count];
+            for _ in 0..40 {
+                queue.add_spare(particles.as_slice().into());
+            }
+            assert_eq!(queue.lock().spare.len(), kept, "{particle_count} particles");
+            assert_eq!(queue.take_spare().particles().len(), particle_count);
+        }
     }
 
     #[test]

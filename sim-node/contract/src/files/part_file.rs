@@ -1,5 +1,6 @@
 //! A file that gets its name only when it is finished.
 
+mod allocation;
 mod disk;
 pub(crate) mod error;
 mod lock;
@@ -14,6 +15,7 @@ use rustix::io::Errno;
 
 use crate::files::kind::kind_of_non_file;
 use crate::files::place::is_locked;
+use allocation::Allocation;
 use disk::DiskFile;
 use error::{PartFileError, io_error};
 use lock::Lock;
@@ -49,6 +51,7 @@ impl Existing {
 #[derive(Debug)]
 pub struct PartFile<F: DiskFile = File> {
     out: BufWriter<F>,
+    allocation: Allocation,
     sync_on_flush: SyncOnFlush,
     path: PathBuf,
     part_path: PathBuf,
@@ -114,7 +117,8 @@ impl<F: DiskFile> PartFile<F> {
     fn begin(file: F, path: &Path, existing: Existing) -> Self {
         let out = BufWriter::with_capacity(BUFFER_SIZE_BYTES, file);
         let (path, part_path) = (path.to_owned(), part_path(path));
-        Self { out, sync_on_flush: SyncOnFlush::Nothing, path, part_path, existing }
+        let (allocation, sync_on_flush) = (Allocation::new(), SyncOnFlush::Nothing);
+        Self { out, allocation, sync_on_flush, path, part_path, existing }
     }
 
     /// Makes every flush wait until the data is on disk, so that a power cut loses only what was
@@ -145,7 +149,7 @@ impl<F: DiskFile> PartFile<F> {
             },
         })?;
         self.sync_name()?;
-        Ok(self.path)
+        Ok(self.path.clone())
     }
 
     /// Writes the whole contents and finishes the file, or leaves nothing.
@@ -161,8 +165,14 @@ impl<F: DiskFile> PartFile<F> {
     }
 
     fn sync(&mut self) -> Result<(), PartFileError> {
-        let synced = self.out.flush().and_then(|()| self.out.get_ref().sync_all());
-        synced.map_err(|cause| io_error(&self.part_path, cause))
+        let whole = self.write_buffer().and_then(|()| self.out.get_ref().sync_all());
+        whole.map_err(|cause| io_error(&self.part_path, cause))
+    }
+
+    /// Writes what is buffered, and frees the space behind it.
+    fn write_buffer(&mut self) -> io::Result<()> {
+        let written = self.out.flush();
+        written.and(self.allocation.free_unused(self.out.get_ref()))
     }
 
     fn sync_name(&self) -> Result<(), PartFileError> {
@@ -205,11 +215,14 @@ impl<F: DiskFile> PartFile<F> {
 
 impl<F: DiskFile> Write for PartFile<F> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.out.write(bytes)
+        self.allocation.make_room(bytes.len(), self.out.get_ref());
+        self.allocation.count(self.out.write(bytes))
     }
 
     fn write_vectored(&mut self, parts: &[IoSlice<'_>]) -> io::Result<usize> {
-        self.out.write_vectored(parts)
+        let count = parts.iter().map(|part| part.len()).sum();
+        self.allocation.make_room(count, self.out.get_ref());
+        self.allocation.count(self.out.write_vectored(parts))
     }
 
     fn flush(&mut self) -> io::Result<()> {
@@ -225,6 +238,13 @@ impl<F: DiskFile> Write for PartFile<F> {
             }
         }
         Ok(())
+    }
+}
+
+impl<F: DiskFile> Drop for PartFile<F> {
+    fn drop(&mut self) {
+        // Nobody is left to be told of an error, and the file stays as it is.
+        let _written = self.write_buffer();
     }
 }
 

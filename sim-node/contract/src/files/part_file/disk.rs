@@ -5,10 +5,18 @@ use std::io::ErrorKind::{InvalidInput, PermissionDenied};
 use std::io::{self, Write};
 use std::path::Path;
 
+use rustix::fs::{FallocateFlags, fallocate};
+
 use crate::files::place;
 
 /// A file that can be synced to disk. Tests replace it, to count calls and to inject errors.
 pub trait DiskFile: Write {
+    /// Allocates disk space from a position on, beyond the end of the file, which stays where it is.
+    fn allocate(&self, position: u64, size_bytes: u64) -> io::Result<()>;
+
+    /// Frees the disk space beyond the end of the file.
+    fn free_unused(&self) -> io::Result<()>;
+
     /// Waits until the contents of the file are on disk.
     fn sync_data(&self) -> io::Result<()>;
 
@@ -23,6 +31,14 @@ pub trait DiskFile: Write {
 }
 
 impl DiskFile for File {
+    fn allocate(&self, position: u64, size_bytes: u64) -> io::Result<()> {
+        Ok(fallocate(self, FallocateFlags::KEEP_SIZE, position, size_bytes)?)
+    }
+
+    fn free_unused(&self) -> io::Result<()> {
+        self.set_len(self.metadata()?.len())
+    }
+
     fn sync_data(&self) -> io::Result<()> {
         Self::sync_data(self)
     }

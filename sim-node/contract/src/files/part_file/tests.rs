@@ -1,6 +1,7 @@
 //! Calls of the operating system, in order, and their errors.
 
 use std::cell::RefCell;
+use std::os::unix::fs::MetadataExt;
 use std::rc::Rc;
 
 use super::*;
@@ -32,6 +33,14 @@ impl Write for NotedFile {
 }
 
 impl DiskFile for NotedFile {
+    fn allocate(&self, _position: u64, _size_bytes: u64) -> io::Result<()> {
+        self.note("allocate")
+    }
+
+    fn free_unused(&self) -> io::Result<()> {
+        self.note("free unused")
+    }
+
     fn sync_data(&self) -> io::Result<()> {
         self.note("sync data")
     }
@@ -118,6 +127,53 @@ fn each_flush_and_the_end_and_both_names_are_synced() {
     );
     let (calls_without, _) = calls(false, None);
     assert_eq!(calls_without, ["write", "write", "write", "sync all", "sync new name"]);
+}
+
+/// Writes 20 parts of 1 MiB and finishes the file. Returns the calls beside the writes.
+fn calls_of_large_file(failing: Option<&'static str>) -> Vec<&'static str> {
+    let folder = Folder::new();
+    let mut file = folder.create(failing);
+    let calls = Rc::clone(&file.out.get_ref().calls);
+    for _ in 0..20 {
+        file.write_all(&vec![1; 1 << 20]).unwrap();
+    }
+    let result = file.finish();
+    assert_eq!(result.is_ok(), failing != Some("free unused"));
+    let calls = calls.take();
+    assert_eq!(calls.iter().filter(|call| **call == "write").count(), 20);
+    calls.into_iter().filter(|call| *call != "write").collect()
+}
+
+#[test]
+fn a_large_file_is_allocated_in_parts_and_what_is_left_is_freed_before_it_is_synced() {
+    let whole = ["allocate", "allocate", "free unused", "sync all", "sync new name"];
+    assert_eq!(calls_of_large_file(None), whole);
+    // Not every file system can allocate, and a disk may be nearly full. A part may be allocated then.
+    let without = ["allocate", "free unused", "sync all", "sync new name"];
+    assert_eq!(calls_of_large_file(Some("allocate")), without);
+    assert_eq!(calls_of_large_file(Some("free unused")), whole[..3]);
+}
+
+#[test]
+fn a_file_has_no_space_beyond_its_end() {
+    for is_finished in [true, false] {
+        let folder = Folder::new();
+        let path = folder.0.join("a.mcap");
+        let mut file = PartFile::create(&path, Existing::Refuse).unwrap();
+        for _ in 0..9 {
+            file.write_all(&vec![1; 1 << 20]).unwrap();
+        }
+        let path = if is_finished {
+            file.finish().unwrap()
+        } else {
+            drop(file);
+            part_path(&path)
+        };
+        let metadata = fs::metadata(path).unwrap();
+        let (size_bytes, used_bytes) = (metadata.len(), metadata.blocks() * 512);
+        assert_eq!(size_bytes, 9 << 20);
+        assert!(used_bytes < size_bytes + (1 << 20), "{used_bytes} bytes are allocated");
+    }
 }
 
 #[test]
