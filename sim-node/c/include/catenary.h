@@ -1055,7 +1055,7 @@ catenary_result catenary_read_status(catenary_client *client,
 // commands that the client sends before that take effect in that step, so the run is the same each time.
 //
 // The node goes on without a client that it has waited for too long: 2 s, unless it was started with
-// another --lockstep-timeout.
+// another --lockstep-timeout. `catenary_missed_turns` shows it.
 catenary_result catenary_join_lockstep(catenary_client *client,
                                        uint32_t every,
                                        double timeout_s);
@@ -1069,6 +1069,11 @@ catenary_result catenary_next_turn(catenary_client *client,
 
 // Ends the turn that `catenary_next_turn` has begun.
 catenary_result catenary_ready(catenary_client *client);
+
+// Gets the number of turns that the node has computed without this client since it joined, because it was
+// not ready in time. Turns of a replay are not counted.
+catenary_result catenary_missed_turns(catenary_client *client,
+                                      uint64_t *count);
 
 // Leaves the lockstep: the node goes on without waiting for this client. Detaching does the same.
 catenary_result catenary_leave_lockstep(catenary_client *client);

@@ -101,6 +101,11 @@ public:
         return snapshot(catenary_next_turn, timeout_s);
     }
     void ready() { check(catenary_ready(client_)); }
+    uint64_t missed_turns() {
+        uint64_t count;
+        check(catenary_missed_turns(client_, &count));
+        return count;
+    }
 
 private:
     template <typename Function> std::optional<Snapshot> snapshot(Function function, double timeout_s) {

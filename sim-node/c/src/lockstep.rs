@@ -13,7 +13,7 @@ use crate::snapshots::{Snapshot, keep};
 /// commands that the client sends before that take effect in that step, so the run is the same each time.
 ///
 /// The node goes on without a client that it has waited for too long: 2 s, unless it was started with
-/// another --lockstep-timeout.
+/// another --lockstep-timeout. `catenary_missed_turns` shows it.
 #[unsafe(no_mangle)]
 pub extern "C" fn catenary_join_lockstep(
     client: *mut ClientHandle,
@@ -48,6 +48,19 @@ pub extern "C" fn catenary_next_turn(
 #[unsafe(no_mangle)]
 pub extern "C" fn catenary_ready(client: *mut ClientHandle) -> CatenaryResult {
     with_client(client, |attached| Ok(attached.client.ready()?))
+}
+
+/// Gets the number of turns that the node has computed without this client since it joined, because it was
+/// not ready in time. Turns of a replay are not counted.
+#[unsafe(no_mangle)]
+pub extern "C" fn catenary_missed_turns(
+    client: *mut ClientHandle,
+    count: Option<&mut MaybeUninit<u64>>,
+) -> CatenaryResult {
+    with_client(client, |attached| {
+        check_place(count.as_deref(), "count")?;
+        write(count, attached.client.missed_turns(), "count")
+    })
 }
 
 /// Leaves the lockstep: the node goes on without waiting for this client. Detaching does the same.

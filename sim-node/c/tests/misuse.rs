@@ -81,6 +81,7 @@ fn every_call_of_a_detached_client_is_refused() {
             catenary_join_lockstep(client, 1, 0.0),
             catenary_next_turn(client, 0.0, None),
             catenary_ready(client),
+            catenary_missed_turns(client, None),
             catenary_leave_lockstep(client),
         ] {
             assert_misuse(result, "this is no client");
@@ -112,6 +113,7 @@ fn wrong_arguments_are_refused_with_their_names() {
     }
     assert_misuse(catenary_join_lockstep(client, 0, 1.0), "every is 0");
     assert_misuse(catenary_ready(client), "call join_lockstep first");
+    assert_misuse(catenary_missed_turns(client, None), "count is null");
     let long = CString::new("x".repeat(161)).unwrap();
     for command in [
         Command::default(),

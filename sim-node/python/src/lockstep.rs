@@ -6,7 +6,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use pyo3::prelude::*;
-use sim_contract::{Client, LockstepError, OwnerState, SnapshotFlags, SnapshotHeader};
+use sim_contract::{Client, LockstepError, OwnerState};
 
 use crate::arguments;
 use crate::data::action::Action;
@@ -29,8 +29,8 @@ pub(crate) struct Lockstep {
 #[derive(Debug, Default)]
 struct Progress {
     is_member: bool,
-    /// Header of the last turn.
-    last: Option<SnapshotHeader>,
+    /// Turns that the node has computed without this member, up to the last turn.
+    missed_turns: u64,
     /// Sequence numbers of sent commands without an outcome.
     sent: Vec<u64>,
     /// Outcomes that have arrived with the last turn.
@@ -73,22 +73,15 @@ impl Lockstep {
     }
 
     /// Checks that the node has waited for this member.
-    fn check_turn(&self, header: &SnapshotHeader) -> PyResult<()> {
-        let last = self.progress().last.replace(*header);
-        let is_replay = header.flags & SnapshotFlags::REPLAY != 0;
-        let last = last.filter(|last| last.run_id == header.run_id);
-        // A recording may lack snapshots.
-        let Some(last) = last.filter(|_| !is_replay) else { return Ok(()) };
-        // A node publishes the multiples of its stride, and a few others after commands.
-        let period = lcm(u64::from(self.every.get()), u64::from(header.stride.max(1)));
-        let expected = (last.step / period + 1) * period;
-        if header.step <= expected {
+    fn check_turn(&self, missed_turns: u64, step: u64) -> PyResult<()> {
+        let known = mem::replace(&mut self.progress().missed_turns, missed_turns);
+        let count = missed_turns.saturating_sub(known);
+        if count == 0 {
             return Ok(());
         }
         Err(Error::new_err(format!(
-            "the node did not wait for this member at step {expected} (now at step {}): it has answered \
-             too late, so the node went on after its --lockstep-timeout",
-            header.step
+            "the node did not wait for this member in {count} of its turns before step {step}: it has answered \
+             too late, so the node went on after its --lockstep-timeout"
         )))
     }
 }
@@ -100,15 +93,6 @@ fn with_timeout(error: LockstepError, timeout_s: f64) -> LockstepError {
         LockstepError::NotAdmitted { owner, .. } => LockstepError::NotAdmitted { timeout, owner },
         other => other,
     }
-}
-
-/// Returns the least common multiple.
-fn lcm(a: u64, b: u64) -> u64 {
-    let (mut divisor, mut rest) = (a, b);
-    while rest > 0 {
-        (divisor, rest) = (rest, divisor % rest);
-    }
-    a / divisor * b
 }
 
 /// Returns the outcomes that have arrived, and the sequence numbers without one.
@@ -201,7 +185,8 @@ impl Lockstep {
             client.next_turn(part).map_err(|error| lockstep_error(&error))
         })?;
         let Some(snapshot) = snapshot else { return Ok(None) };
-        self.check_turn(snapshot.header())?;
+        let missed_turns = node.call(py, |client| Ok(client.missed_turns()))?;
+        self.check_turn(missed_turns, snapshot.header().step)?;
         let sent = mem::take(&mut self.progress().sent);
         let (outcomes, sent) = node.call(py, |client| arrived(client, sent))?;
         {

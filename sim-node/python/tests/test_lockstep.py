@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import re
 import time
 
 import catenary
@@ -114,8 +115,10 @@ def test_a_member_that_answers_too_late_is_told_so(
         # Not the first one, at which the node may have published a step for a command.
         step = next(steps).step
         end = time.monotonic() + DEADLINE
-        while other.latest().step < step + 10 * period:
+        while (newest := other.latest().step) < step + 10 * period:
             assert time.monotonic() < end
-        missed = f"did not wait for this member at step {step + period} "
-        with pytest.raises(catenary.Error, match=missed):
+        with pytest.raises(catenary.Error, match="did not wait for this member in") as raised:
             next(steps)
+        count, turn = map(int, re.findall(r"in (\d+) of its turns before step (\d+)", str(raised.value))[0])
+        assert turn >= newest
+        assert turn == step + (count + 1) * period

@@ -157,6 +157,30 @@ fn a_member_of_every_fourth_step_is_waited_for_at_those_steps_only() {
 }
 
 #[test]
+fn a_member_that_is_too_late_sees_how_many_turns_it_has_missed() {
+    let sandbox = Sandbox::new();
+    let args = ["run", "curtain", "--lockstep-timeout", "100ms", "--every", "2"];
+    let _node = Process::start_ready(Program::SimNode, &sandbox, &args);
+    let mut client = Client::attach(&sandbox.endpoint()).unwrap();
+    assert_eq!(client.missed_turns(), 0);
+    client.join_lockstep_every(NonZeroU32::new(3).unwrap(), DEADLINE).unwrap();
+    let turn = |client: &mut Client| client.next_turn(DEADLINE).unwrap().unwrap().header().step;
+    // Not the first one, at which the node may have published a step for a command.
+    turn(&mut client);
+    client.ready().unwrap();
+    let last = turn(&mut client);
+    assert_eq!(client.missed_turns(), 0);
+    wait_for("steps without the member", || {
+        (ctl(&sandbox, &["hash"])["step"].as_u64().unwrap() > last + 60).then_some(())
+    });
+    client.ready().unwrap();
+    let next = turn(&mut client);
+    // A step is published if it is a multiple of 2, and the member takes part in every third.
+    assert_eq!(client.missed_turns(), (next - last) / 6 - 1);
+    assert!(next > last + 60, "{next} after {last}");
+}
+
+#[test]
 fn a_member_takes_part_at_published_steps_only() {
     let sandbox = Sandbox::new();
     let args = ["run", "curtain", "--as-fast-as-possible", "--every", "5"];

@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use crate::client::request::OwnerState;
 use crate::messages::ready::Ready;
-use crate::messages::snapshot::SnapshotHeader;
+use crate::messages::snapshot::{SnapshotFlags, SnapshotHeader};
 use crate::ports::reader::ReadError;
 use crate::ports::service::{READY, ServiceError};
 use crate::ports::services::{AttachError, Attachment};
@@ -56,6 +56,8 @@ pub(crate) struct Member {
     message: Ready,
     /// The turn has begun, and the message is not sent.
     is_in_turn: bool,
+    /// Number of turns that the node has computed without this member.
+    missed_turn_count: u64,
 }
 
 impl Member {
@@ -67,7 +69,7 @@ impl Member {
         let services = &attachment.services;
         let message = Ready { client_id, every: every.get(), tag: Ready::TAG, ..Ready::default() };
         let writer = ValueWriter::create(&services.config, &services.ready, &READY)?;
-        Ok(Self { writer, message, is_in_turn: false })
+        Ok(Self { writer, message, is_in_turn: false, missed_turn_count: 0 })
     }
 
     pub(crate) fn join(&self) -> Result<(), LockstepError> {
@@ -88,8 +90,25 @@ impl Member {
     }
 
     pub(crate) fn begin_turn(&mut self, header: &SnapshotHeader) {
+        self.missed_turn_count += self.turns_before(header);
         (self.message.run_id, self.message.step) = (header.run_id, header.step);
         self.is_in_turn = true;
+    }
+
+    /// Returns the number of turns between the last one and that of a snapshot. A node publishes the multiples of its
+    /// stride, and a few more after commands; a replay may lack snapshots.
+    fn turns_before(&self, header: &SnapshotHeader) -> u64 {
+        let Ready { run_id, step, every, .. } = self.message;
+        if header.run_id != run_id || header.flags & SnapshotFlags::REPLAY != 0 {
+            return 0;
+        }
+        let period = least_common_multiple(every.into(), header.stride.max(1).into());
+        let next = (step / period + 1) * period;
+        header.step.saturating_sub(next).div_ceil(period)
+    }
+
+    pub(crate) fn missed_turn_count(&self) -> u64 {
+        self.missed_turn_count
     }
 
     /// Ends the turn, if one has begun.
@@ -100,4 +119,12 @@ impl Member {
         }
         Ok(())
     }
+}
+
+fn least_common_multiple(a: u64, b: u64) -> u64 {
+    let (mut divisor, mut rest) = (a, b);
+    while rest > 0 {
+        (divisor, rest) = (rest, divisor % rest);
+    }
+    a / divisor * b
 }
