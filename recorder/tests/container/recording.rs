@@ -70,6 +70,23 @@ impl Recording {
 
     /// Writes the messages of a simulation after a change.
     pub(crate) fn write_changed(&self, change: impl Fn(&mut Vec<Message>)) -> Vec<u8> {
+        self.write_with(change, None)
+    }
+
+    /// Writes the messages of a simulation after a change, and an end of another recording.
+    pub(crate) fn write_closed(
+        &self,
+        change: impl Fn(&mut Vec<Message>),
+        closing: &Closing,
+    ) -> Vec<u8> {
+        self.write_with(change, Some(closing))
+    }
+
+    fn write_with(
+        &self,
+        change: impl Fn(&mut Vec<Message>),
+        other_closing: Option<&Closing>,
+    ) -> Vec<u8> {
         let scene = Scene::from_toml(builtin::text("rope").unwrap(), "rope").unwrap();
         let mut messages = simulate(&scene);
         change(&mut messages);
@@ -97,7 +114,7 @@ impl Recording {
         for topic in [Topic::Steps, Topic::Particles] {
             closing.counts[topic].lost = self.lost;
         }
-        log.finish(&closing).unwrap();
+        log.finish(other_closing.unwrap_or(&closing)).unwrap();
         bytes
     }
 

@@ -4,8 +4,8 @@
 use std::io::{Cursor, Write};
 
 use recorder::{
-    Compression, FrameReader, LogEnd, LogReader, Message, RepairError, RepairReport, Topic,
-    check_file, repair_file,
+    Closing, Compression, FrameReader, LogEnd, LogReader, Message, RepairError, RepairReport,
+    Topic, check_file, repair_file,
 };
 
 use super::recording::{Place, Random, Recording, records, selections};
@@ -13,6 +13,8 @@ use super::recording::{Place, Random, Recording, records, selections};
 const SEEDS: u64 = 60;
 /// Opcode of a chunk.
 const CHUNK: u8 = 6;
+const MESSAGE_INDEX: u8 = 7;
+const METADATA: u8 = 12;
 
 fn repair(bytes: &[u8]) -> Result<(Vec<u8>, RepairReport), RepairError> {
     let mut out = Vec::new();
@@ -53,6 +55,23 @@ fn count(messages: &[Message], topic: Topic) -> usize {
     messages.iter().filter(|one| one.topic() == topic).count()
 }
 
+fn closing(bytes: &[u8]) -> Closing {
+    let mut log = LogReader::new(bytes).unwrap();
+    while log.next_message().unwrap().is_some() {}
+    log.closing().unwrap().clone()
+}
+
+/// Asserts that kept and declared messages are those of the original, whose end must be intact.
+fn assert_declared(original: &[u8], repaired: &[u8], case: &str) {
+    let (kept, all, closing) = (messages(repaired), messages(original), closing(repaired));
+    for topic in Topic::ALL.into_iter().filter(|topic| *topic != Topic::Tf) {
+        let counts = &closing.counts[topic];
+        let sum = count(&kept, topic) as u64 + counts.lost;
+        assert_eq!(sum, count(&all, topic) as u64, "{case}: {}", topic.name());
+        assert_eq!(counts.written, count(&kept, topic) as u64, "{case}: {}", topic.name());
+    }
+}
+
 #[test]
 fn a_repair_keeps_what_a_selection_has() {
     for selection in selections() {
@@ -65,6 +84,12 @@ fn a_repair_keeps_what_a_selection_has() {
         let report = check_file(Cursor::new(&repaired), None, &mut |_, _| {}).unwrap();
         assert_eq!(report.findings.list(), [], "{selection:?}");
     }
+}
+
+/// Returns the metadata records.
+fn metadata(bytes: &[u8]) -> Vec<&[u8]> {
+    let all = records(bytes).into_iter().filter(|one| one.opcode == METADATA);
+    all.map(|one| &bytes[one.start..one.end]).collect()
 }
 
 fn chunks(bytes: &[u8]) -> Vec<Place> {
@@ -96,14 +121,10 @@ fn a_damaged_chunk_is_skipped_and_its_steps_are_declared() {
     let kept = steps(&repaired);
     let missing: Vec<u64> = (0..=40).filter(|step| !kept.contains(step)).collect();
     assert!(!missing.is_empty() && kept.first() == Some(&0) && kept.last() == Some(&40));
-    let range = format!("{}..{}", missing[0], missing[missing.len() - 1] + 1);
+    let range = format!("{}..={}", missing[0], missing[missing.len() - 1]);
     let ranges: Vec<_> = report.losses.ranges().iter().map(ToString::to_string).collect();
     assert_eq!(ranges, [range], "the steps that the file lacks");
-    let closing = {
-        let mut log = LogReader::new(repaired.as_slice()).unwrap();
-        while log.next_message().unwrap().is_some() {}
-        log.closing().unwrap().clone()
-    };
+    let closing = closing(&repaired);
     assert_eq!(closing.missing()["/particles"], missing.len() as u64);
     assert_eq!(closing.stop_reason, "test", "that of the original");
 }
@@ -119,6 +140,70 @@ fn a_lost_first_chunk_takes_only_its_own_messages_with_it() {
         assert_repaired(&bytes, &repaired, "first chunk");
         assert_eq!(report.steps.map(|[_, last]| last), Some(40));
         assert!(!report.losses.is_empty());
+    }
+}
+
+/// The first chunk also declares the channels.
+#[test]
+fn a_chunk_whose_header_is_damaged_takes_only_its_own_messages_with_it() {
+    let bytes = Recording { compression: Compression::Zstd, ..Recording::default() }.write();
+    let all = chunks(&bytes);
+    for (number, chunk) in all.iter().enumerate().filter(|(n, _)| [0, 3, all.len() - 1].contains(n))
+    {
+        let (own, _) = repair(&{
+            let mut damaged = bytes.clone();
+            damaged[chunk.end - 30] ^= 1;
+            damaged
+        })
+        .unwrap();
+        // Its opcode, its length, and its size behind two times.
+        for byte in (chunk.start..chunk.start + 9).chain([chunk.start + 25, chunk.start + 28]) {
+            let case = format!("chunk {number}, byte {}", byte - chunk.start);
+            let mut damaged = bytes.clone();
+            damaged[byte] ^= 1 << 6;
+            let (repaired, report) = repair(&damaged).unwrap();
+            assert_repaired(&bytes, &repaired, &case);
+            assert_declared(&bytes, &repaired, &case);
+            assert!(!report.losses.is_empty(), "{case}");
+            assert_eq!(messages(&repaired), messages(&own), "{case}");
+        }
+    }
+}
+
+#[test]
+fn a_damaged_message_index_takes_nothing_with_it() {
+    let bytes = Recording::default().write();
+    let indexes = records(&bytes).into_iter().filter(|one| one.opcode == MESSAGE_INDEX);
+    for index in indexes.take(8) {
+        for place in [index.start + 9, index.end - 1] {
+            let mut damaged = bytes.clone();
+            damaged[place] ^= 2;
+            let (repaired, report) = repair(&damaged).unwrap();
+            assert_eq!(messages(&repaired), messages(&bytes));
+            assert!(report.losses.is_empty() && !report.is_uncertain);
+            assert_eq!(report.findings.list()[0].record, "message index");
+        }
+        // The indexes behind it are those of an intact chunk, so they count no losses.
+        let mut damaged = bytes.clone();
+        damaged[index.start] ^= 0x40;
+        let (repaired, _) = repair(&damaged).unwrap();
+        assert_eq!(messages(&repaired), messages(&bytes));
+        assert_declared(&bytes, &repaired, "a part that is no record");
+    }
+}
+
+#[test]
+fn a_message_that_is_missing_in_a_sound_file_is_declared() {
+    let whole = Recording::default().write();
+    let closed = closing(&whole);
+    for (topic, step) in [(Topic::Tears, 10), (Topic::Particles, 20), (Topic::Outcomes, 25)] {
+        let is_removed = |one: &Message| one.topic() == topic && one.step() == step;
+        let bytes = Recording::default()
+            .write_closed(|messages| messages.retain(|one| !is_removed(one)), &closed);
+        let (repaired, report) = repair(&bytes).unwrap();
+        assert_repaired(&whole, &repaired, topic.name());
+        assert_declared(&whole, &repaired, topic.name());
+        assert_eq!(report.losses.messages()[topic.name()], 1);
     }
 }
 
@@ -139,7 +224,12 @@ fn any_damage_leaves_a_sound_file_with_messages_of_the_original() {
             _ => drop(damaged.drain(at..(at + 1 + random.below(5000)).min(bytes.len()))),
         }
         let (repaired, _) = repair(&damaged).unwrap();
-        assert_repaired(&bytes, &repaired, &format!("seed {seed}"));
+        let case = format!("seed {seed}");
+        assert_repaired(&bytes, &repaired, &case);
+        let end = metadata(&bytes).pop().unwrap();
+        if damaged.windows(end.len()).any(|part| part == end) {
+            assert_declared(&bytes, &repaired, &case);
+        }
     }
 }
 
@@ -154,10 +244,7 @@ fn a_message_that_no_node_publishes_is_left_out_with_its_snapshot() {
     });
     let (repaired, report) = repair(&bytes).unwrap();
     assert_repaired(&Recording::default().write(), &repaired, "NaN");
-    assert_eq!(
-        report.losses.ranges().iter().map(ToString::to_string).collect::<Vec<_>>(),
-        ["9..10"]
-    );
+    assert_eq!(report.losses.ranges().iter().map(ToString::to_string).collect::<Vec<_>>(), ["9"]);
     assert!(!steps(&repaired).contains(&9));
 }
 

@@ -27,7 +27,10 @@ pub struct LostSteps {
 impl std::fmt::Display for LostSteps {
     fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match (self.after, self.before) {
-            (Some(after), Some(before)) => write!(formatter, "{}..{before}", after + 1),
+            (Some(after), Some(before)) if after + 2 == before => {
+                write!(formatter, "{}", after + 1)
+            }
+            (Some(after), Some(before)) => write!(formatter, "{}..={}", after + 1, before - 1),
             (Some(after), None) => write!(formatter, "from {} on", after + 1),
             (None, Some(before)) => write!(formatter, "before {before}"),
             (None, None) => formatter.write_str("all"),
@@ -48,7 +51,8 @@ pub struct Losses {
     last_step: Option<u64>,
     /// Something is lost since the newest copied snapshot.
     is_open: bool,
-    has_any: bool,
+    /// A part of the file is lost whose content is unknown.
+    has_lost_part: bool,
     /// The content that damage before the description of the run may have taken.
     head: Option<&'static str>,
     lost_attachments: u64,
@@ -75,7 +79,10 @@ impl Losses {
 
     /// Returns `true` if nothing is lost.
     pub fn is_empty(&self) -> bool {
-        !self.has_any
+        !self.has_lost_part
+            && self.head.is_none()
+            && self.ranges.is_empty()
+            && self.messages().is_empty()
     }
 
     /// Returns the content that damage before the description of the run may have taken, for people.
@@ -86,22 +93,21 @@ impl Losses {
     /// Counts an attachment that is left out. No message is missing by it.
     pub(super) fn add_attachment(&mut self) {
         self.lost_attachments = self.lost_attachments.saturating_add(1);
-        self.has_any = true;
     }
 
     /// Marks content before the description of the run as lost. No step is missing by it.
     pub(super) fn lose_head(&mut self, what: &'static str) {
         self.head = Some(what);
-        self.has_any = true;
     }
 
-    pub(super) fn begin_gap(&mut self) {
+    /// Marks a part of the file as lost.
+    pub(super) fn add_part(&mut self) {
         self.is_open = true;
-        self.has_any = true;
+        self.has_lost_part = true;
     }
 
     pub(super) fn add_message(&mut self, topic: Option<Topic>) {
-        self.begin_gap();
+        self.is_open = true;
         match topic {
             Some(topic) => self.counts[topic].lost += 1,
             None => self.unknown_count += 1,
@@ -158,18 +164,28 @@ impl Losses {
         let mut closing = closing
             .unwrap_or_else(|| Closing { stop_reason: reason.to_owned(), ..Closing::default() });
         let gaps = content.gaps.counts();
+        let has_losses = !self.is_empty();
         for topic in Topic::ALL {
             let counts = &mut closing.counts[topic];
+            let is_counted = topic != Topic::Tf || content.has_channels_of_today();
+            let written = if is_counted { content.counts[topic].written } else { 0 };
+            // Damage may hide what it has taken, and a message may be there twice, but the end of the file has the
+            // number of messages that the recorder wrote.
+            if let Some(missing) = counts.written.checked_sub(written)
+                && had_end
+                && topic != Topic::Tf
+            {
+                self.counts[topic].lost = missing;
+            }
             counts.lost = counts.lost.saturating_add(self.counts[topic].lost);
             let declared = counts.lost.saturating_add(counts.gaps);
             let more = gaps[topic].gaps.saturating_sub(declared);
             counts.lost = counts.lost.saturating_add(more);
             // Gaps of a file that declares no losses are those of the repair only if it left something out.
-            if self.has_any {
+            if has_losses {
                 self.counts[topic].lost = self.counts[topic].lost.max(more);
             }
-            let is_counted = topic != Topic::Tf || content.has_channels_of_today();
-            counts.written = if is_counted { content.counts[topic].written } else { 0 };
+            counts.written = written;
             if !had_end {
                 counts.received = counts.written.saturating_add(counts.lost);
             }

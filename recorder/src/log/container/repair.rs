@@ -5,11 +5,13 @@
 //! sound, and says what it lacks: message counts in the metadata `recorder`, and ranges of steps in the
 //! metadata `repair`.
 
+mod message_index;
+
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io::{Read, Seek, Write};
 
-use mcap::records::{MessageIndex, Metadata, Record, op};
+use mcap::records::{Metadata, Record, op};
 use mcap::{Attachment, MAGIC};
 use sim_contract::Stop;
 
@@ -19,10 +21,13 @@ use super::content::ContentCheck;
 use super::finding::{AfterEnd, Findings, RepairReport, record_name};
 use super::losses::{LOST_SCENE, LOST_SELECTION};
 use super::lost_load::LoadRows;
+use super::places::Places;
 use super::salvage::{Format, Salvage, size_in_memory};
 use super::walk::{Part, Walk};
 use super::window::Window;
-use crate::log::read::limits::{HEADER_RECORD_SIZE_BYTES_MAX, SizeLimits};
+use crate::log::read::limits::{
+    HEADER_RECORD_SIZE_BYTES_MAX, RECORD_HEADER_SIZE_BYTES, SizeLimits,
+};
 use crate::log::read::read_error::{LogEnd, ReadError};
 use crate::log::run::selection::{ContentSelection, SELECTION_METADATA};
 use crate::log::run::{CLOSING_METADATA, Closing, RUN_METADATA, SCENE_ATTACHMENT, header_library};
@@ -92,6 +97,8 @@ enum Section {
     Data,
     /// The message indexes of a damaged chunk follow.
     AfterBadChunk,
+    /// Records follow that may belong to a chunk that is not readable as one.
+    AfterDamage,
     /// The index, which is rewritten.
     Index,
 }
@@ -108,6 +115,8 @@ struct Repair<W: Write> {
     load: Option<LoadRows>,
     selection: ContentSelection,
     content: Option<ContentCheck>,
+    /// The messages of the last chunk, to compare its message indexes with.
+    places: Places,
     new_limits: Option<SizeLimits>,
     /// Attachments and metadata before the first chunk.
     head: Vec<Record<'static>>,
@@ -135,6 +144,7 @@ impl<W: Write> Repair<W> {
             load: None,
             selection: ContentSelection::default(),
             content: None,
+            places: Places::default(),
             new_limits: None,
             head: Vec::new(),
             head_size_bytes: 0,
@@ -169,6 +179,9 @@ impl<W: Write> Repair<W> {
                 let what = format!("{size_bytes} bytes are damaged: {cause}");
                 self.allow_scene(size_bytes);
                 self.lose(bytes.start, "damaged record", &what)?;
+                if self.section != Section::Index {
+                    self.section = Section::AfterDamage;
+                }
                 Ok(None)
             }
             // A killed recorder leaves whole records.
@@ -269,7 +282,7 @@ impl<W: Write> Repair<W> {
             }
             Record::Footer(_) => self.section = Section::Index,
             Record::Header(header) => self.format.library = header.library,
-            Record::MessageIndex(index) => self.add_message_index(&index),
+            Record::MessageIndex(index) => self.add_message_index(byte, &index)?,
             Record::Metadata(metadata) => self.add_metadata(byte, metadata)?,
             Record::Attachment { header, data, crc } => {
                 if header.name == SCENE_ATTACHMENT && self.content.is_none() {
@@ -386,27 +399,24 @@ impl<W: Write> Repair<W> {
                 return self.lose(byte, "chunk", &cause);
             }
         };
-        for record in InnerRecords::new(chunk.content) {
-            let record = record.and_then(|inner| {
-                mcap::parse_record(inner.opcode, inner.body).map_err(|error| error.to_string())
+        let size_bytes = (RECORD_HEADER_SIZE_BYTES + body.len()) as u64;
+        self.places.begin_chunk(byte, size_bytes, &chunk.header);
+        for inner in InnerRecords::new(chunk.content) {
+            let record = inner.and_then(|inner| {
+                let record = mcap::parse_record(inner.opcode, inner.body);
+                record.map(|record| (record, inner.offset)).map_err(|error| error.to_string())
             });
             match record {
-                Ok(record) => self.add_content_record(byte, "chunk", &record)?,
+                Ok((record, offset)) => {
+                    if let Record::Message { header, .. } = &record {
+                        self.places.add_message(header, offset);
+                    }
+                    self.add_content_record(byte, "chunk", &record)?;
+                }
                 Err(what) => self.lose(byte, "chunk", &what)?,
             }
         }
         Ok(())
-    }
-
-    /// Declares the channels as a recorder does, if the first chunk, which declares them, is lost.
-    fn declare_channels(&mut self) -> Result<(), WriteError> {
-        let (Some(salvage), Some(content)) = (&mut self.salvage, &mut self.content) else {
-            return Ok(());
-        };
-        if content.has_channels() || !content.has_channels_of_today() {
-            return Ok(());
-        }
-        salvage.declare_channels(content, self.load.take())
     }
 
     /// Copies a schema, a channel or a message.
@@ -420,6 +430,9 @@ impl<W: Write> Repair<W> {
             return Err(self.no_run().into());
         }
         self.begin()?;
+        if matches!(record, Record::Message { .. }) {
+            self.declare_channels()?;
+        }
         let (Some(salvage), Some(content)) = (&mut self.salvage, &mut self.content) else {
             return Ok(());
         };
@@ -440,15 +453,6 @@ impl<W: Write> Repair<W> {
             self.findings.add(byte, place, what);
         }
         Ok(())
-    }
-
-    /// Counts the messages of a damaged chunk.
-    fn add_message_index(&mut self, index: &MessageIndex) {
-        let (Some(salvage), Some(content)) = (&mut self.salvage, &self.content) else { return };
-        if self.section == Section::AfterBadChunk {
-            let topic = content.topic(index.channel_id);
-            salvage.losses.add_indexed(topic, index.records.len() as u64);
-        }
     }
 
     /// Returns the error of a file without a readable description of its run.
@@ -478,7 +482,9 @@ impl<W: Write> Repair<W> {
         let (_, losses) = salvage.finish(self.closing.take(), &mut content, &mut metadata)?;
         let last = content.last_row().map(|row| row.step);
         Ok(RepairReport {
-            is_uncertain: self.has_wrong_checksum && losses.is_empty(),
+            is_uncertain: self.has_wrong_checksum
+                && losses.is_empty()
+                && self.findings.count() == 0,
             findings: self.findings,
             counts: content.counts,
             steps: self.first_step.zip(last).map(|(first, last)| [first, last]),

@@ -296,6 +296,11 @@ impl<W: Write> Salvage<W> {
     ) -> Result<Result<(), String>, WriteError> {
         let topic = content.topic(header.channel_id);
         self.add_start(header, topic, content)?;
+        if topic == Some(Topic::Steps) && self.row.is_some() {
+            // The payload of the header before it is missing.
+            self.losses.add_message(Some(Topic::Particles));
+            self.drop_row(content);
+        }
         match content.check(header, data) {
             Ok(Sound::Row) => {
                 let step = content.row_step().unwrap_or(0);
@@ -330,7 +335,7 @@ impl<W: Write> Salvage<W> {
     pub(super) fn mark_gap(&mut self, content: &mut ContentCheck) {
         self.drop_row(content);
         content.mark_gap();
-        self.losses.begin_gap();
+        self.losses.add_part();
     }
 
     /// Leaves out a header without its payload.

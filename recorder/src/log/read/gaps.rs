@@ -47,8 +47,12 @@ impl GapCounter {
         }
     }
 
-    /// Adds the numbers that are left out before a snapshot. Numbers count modulo 2^32.
+    /// Adds the numbers that are left out before a snapshot. Numbers count modulo 2^32. One that goes back is that of
+    /// a snapshot that the file has twice.
     fn add_snapshot(&mut self, index: u32) {
+        if self.last_snapshot.is_some_and(|last| index.wrapping_sub(last).cast_signed() <= 0) {
+            return;
+        }
         let last = self.last_snapshot.replace(index);
         let missing = last.map_or(0, |last| self.selection.missing_between(last, index));
         let topics = [Topic::Steps, Topic::Particles];
@@ -119,6 +123,12 @@ mod tests {
     #[test]
     fn the_number_of_a_snapshot_wraps() {
         let messages = [snapshot(u32::MAX, 0), snapshot(0, 0), snapshot(2, 0)];
+        assert_eq!(missing(&messages).snapshots, 1);
+    }
+
+    #[test]
+    fn a_snapshot_that_the_file_has_twice_adds_no_gap() {
+        let messages = [0, 1, 2, 1, 2, 3, 5].map(|index| snapshot(index, 0));
         assert_eq!(missing(&messages).snapshots, 1);
     }
 
