@@ -49,17 +49,20 @@ pub fn find_state<R: Read>(
     wanted: Wanted,
 ) -> Result<StatePlace, FindStateError> {
     let mut frames = FrameReader::new(log);
-    let (mut found, mut keyframe_step, mut first) = (None, None, None);
+    let (mut found, mut keyframe_step) = (None, None);
+    // The snapshots beside the wanted step.
+    let (mut before, mut behind) = (None, None);
     while let Some(frame) = frames.next_frame()? {
         let step = frame.row.step;
-        first.get_or_insert(step);
         let is_later = match wanted {
             Wanted::Last => false,
             Wanted::Step(wanted) | Wanted::UpTo(wanted) => step > wanted,
         };
         if is_later {
+            behind = Some(step);
             break;
         }
+        before = Some(step);
         if frame.own_keyframe().is_some() && frame.particles.is_some() {
             keyframe_step = Some(step);
         }
@@ -69,13 +72,22 @@ pub fn find_state<R: Read>(
         Wanted::Step(wanted) => place.step == wanted,
         Wanted::Last | Wanted::UpTo(_) => true,
     });
-    let problem = || match (wanted, first) {
-        (_, None) => "has no snapshot".to_owned(),
-        (Wanted::Step(step) | Wanted::UpTo(step), Some(first)) => format!(
-            "has no complete state of step {step}: it begins with step {first}, and `recorder info` \
-             shows its steps"
-        ),
-        (Wanted::Last, Some(_)) => "has no keyframe".to_owned(),
+    let problem = || {
+        let (Wanted::Step(step) | Wanted::UpTo(step)) = wanted else {
+            return if before.is_none() { "has no snapshot" } else { "has no keyframe" }.to_owned();
+        };
+        let reason = match (before, behind) {
+            (None, None) => return "has no snapshot".to_owned(),
+            (None, Some(behind)) => format!("it begins with step {behind}"),
+            (Some(before), _) if before == step || keyframe_step.is_none() => {
+                "no keyframe precedes it".to_owned()
+            }
+            (Some(before), None) => format!("it ends with step {before}"),
+            (Some(before), Some(behind)) => {
+                format!("the nearest snapshots are those of steps {before} and {behind}")
+            }
+        };
+        format!("has no complete state of step {step}: {reason}")
     };
     found.ok_or_else(|| FindStateError::Missing { problem: problem(), end: frames.end().cloned() })
 }

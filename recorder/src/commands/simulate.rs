@@ -51,14 +51,15 @@ pub(crate) struct SimulateArgs {
     /// A built-in scene, a TOML file (a path with / or ending in .toml), or a recording with a
     /// scene (ending in .mcap)
     scene: String,
-    /// Number of steps to compute after step 0 [default: those of the recording]
+    /// Number of steps to compute after step 0 of the scene. Without it, a recording is simulated again with its
+    /// own steps and commands
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = whole_number)]
     steps: Option<u64>,
     /// Recording to write [default: none, only the summary is printed]
     #[arg(short, long, value_name = "OUT.mcap")]
     output: Option<PathBuf>,
     /// Commands: a file of JSON lines, or a recording (ending in .mcap), whose outcomes are
-    /// repeated [default: none, or those of the recording]
+    /// repeated [default: with --steps none, else those of the recording]
     #[arg(long, value_name = "FILE")]
     commands: Option<String>,
     /// Leave out the command with this index in /outcomes of the recording. Can be repeated

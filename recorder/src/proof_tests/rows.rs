@@ -277,9 +277,9 @@ fn the_bending_of_a_block_that_the_simulation_has_not_is_found() {
     };
     let of = |block, value| BlockValue { block, value };
     for (blocks, text) in [
-        (&[][..], "bending of block 0: recorded none, simulated Number(0.03)"),
-        (&[of(0, 0.04)], "bending of block 0: recorded Number(0.04), simulated Number(0.03)"),
-        (&[of(0, 0.03), of(1, 0.1)], "bending of block 1: recorded Number(0.1), simulated none"),
+        (&[][..], "bending of block 0: recorded none, simulated 0.03"),
+        (&[of(0, 0.04)], "bending of block 0: recorded 0.04, simulated 0.03"),
+        (&[of(0, 0.03), of(1, 0.1)], "bending of block 1: recorded 0.1, simulated none"),
     ] {
         let report = with_blocks(blocks);
         assert_eq!((report.verdict, report.step), (Verdict::Diverged, Some(54)), "{report}");

@@ -6,7 +6,9 @@ use crate::log::{
     ColliderDetails, ColliderRow, CollidersRow, EventRow, ForcesRow, Message, ParametersRow,
     TearsRow,
 };
-use sim_contract::{ForceKind, ForceRow, ParameterValues, ParticleFlags, ParticleState, Setting};
+use sim_contract::{
+    ForceKind, ForceRow, ParameterValue, ParameterValues, ParticleFlags, ParticleState, Setting,
+};
 use sim_solver::{Keyframe, Solver};
 
 use crate::simulation::solver_rows::{colliders_row, forces_row, newest_tears_row};
@@ -263,10 +265,18 @@ fn compare_parameters(recorded: &ParametersRow, solver: &Solver) -> Option<Strin
     let setting = old.get(place).or_else(|| new.get(place))?;
     let block = setting.block.map_or_else(String::new, |block| format!(" of block {block}"));
     let value = |settings: &[Setting]| {
-        settings.get(place).map_or_else(|| "none".to_owned(), |one| format!("{:?}", one.value))
+        settings.get(place).map_or_else(|| "none".to_owned(), |one| value_text(one.value))
     };
     let (name, old, new) = (setting.parameter.name(), value(&old), value(&new));
     Some(format!("/parameters: parameter {name}{block}: recorded {old}, simulated {new}"))
+}
+
+fn value_text(value: ParameterValue) -> String {
+    match value {
+        ParameterValue::Number(number) => number.to_string(),
+        ParameterValue::Vector(vector) => format!("{vector:?}"),
+        ParameterValue::Off => "off".to_owned(),
+    }
 }
 
 /// Compares the impulses of a step.

@@ -39,7 +39,7 @@ impl Existing {
     /// If the name belongs to a file that may not be replaced, or to something that is not a file.
     pub fn check(self, path: &Path) -> Result<(), PartFileError> {
         check_kind(path)?;
-        if self == Self::Refuse && path.exists() {
+        if self == Self::Refuse && is_taken(path) {
             return Err(PartFileError::Exists(path.to_owned()));
         }
         Ok(())
@@ -93,7 +93,7 @@ impl PartFile {
         existing.check(path)?;
         let part_path = part_path(path);
         check_unused(&part_path)?;
-        if existing == Existing::Refuse && part_path.exists() {
+        if existing == Existing::Refuse && is_taken(&part_path) {
             return Err(PartFileError::PartExists(part_path));
         }
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
@@ -202,7 +202,7 @@ impl<F: DiskFile> PartFile<F> {
             Ok(()) => Ok(()),
             Err(Errno::EXIST) => Err(PartFileError::Exists(self.path.clone())),
             // Some file systems do not support NOREPLACE. Test for the file once more instead.
-            Err(Errno::INVAL | Errno::NOSYS) if self.path.exists() => {
+            Err(Errno::INVAL | Errno::NOSYS) if is_taken(&self.path) => {
                 Err(PartFileError::Exists(self.path.clone()))
             }
             Err(Errno::INVAL | Errno::NOSYS) => {
@@ -291,6 +291,11 @@ fn check_unused(path: &Path) -> Result<(), PartFileError> {
         // Later errors report a file that cannot be opened.
         _ => Ok(()),
     }
+}
+
+/// Returns `true` if a file has this name, or a link, also one to nothing: the finished file cannot take its place.
+fn is_taken(path: &Path) -> bool {
+    fs::symlink_metadata(path).is_ok()
 }
 
 /// Refuses a name that belongs to something other than a regular file or a link to one. Later errors

@@ -220,3 +220,19 @@ fn an_error_of_writing_a_whole_file_leaves_nothing_or_the_complete_file() {
     assert!(error.leaves_complete_file());
     assert_eq!(folder.names(), ["a.mcap"]);
 }
+
+#[test]
+fn a_link_to_nothing_is_refused_before_anything_is_written() {
+    let folder = Folder::new();
+    let path = folder.0.join("a.mcap");
+    std::os::unix::fs::symlink("nothing", &path).unwrap();
+    for error in [
+        PartFile::create(&path, Existing::Refuse).unwrap_err(),
+        PartFile::check(&path, Existing::Refuse).unwrap_err(),
+    ] {
+        assert!(matches!(error, PartFileError::Exists(_)), "{error}");
+    }
+    assert_eq!(folder.names(), ["a.mcap"]);
+    PartFile::write_whole(&path, Existing::Overwrite, b"new").unwrap();
+    assert_eq!(fs::read(&path).unwrap(), b"new");
+}
