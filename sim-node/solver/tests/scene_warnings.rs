@@ -335,9 +335,15 @@ fn a_thickness_that_reaches_second_neighbours_causes_a_warning() {
     };
     assert_warns(
         &contact(0.2),
-        "contact.thickness: 0.2 m is 2.0 times the spacing of generate[0], 0.1 m: its particles that are \
+        "contact.thickness: 0.2 m is 2 times the spacing of generate[0], 0.1 m: its particles that are \
          nearer than 0.32 m at load never touch, so small folds pass through themselves; use at most the \
          spacing",
+    );
+    assert_warns(
+        &contact(0.4),
+        "contact.thickness: 0.4 m is 4 times the spacing of generate[0], 0.1 m: its particles that are nearer than \
+         0.64 m at load never touch, so small folds pass through themselves, and what touches can be thrown apart; \
+         use at most the spacing",
     );
     assert_eq!(warnings(&contact(0.12)), Vec::<String>::new());
 }
@@ -355,7 +361,12 @@ fn a_thickness_that_leaves_room_between_particles_causes_a_warning() {
          between its particles; use at least three quarters of the spacing, or mode = \"surfaces\" for cloth",
     );
     assert_eq!(warnings(&contact(0.08, "particles")), Vec::<String>::new());
-    assert_eq!(warnings(&contact(0.02, "surfaces")), Vec::<String>::new());
+    assert_warns(
+        &contact(0.02, "surfaces"),
+        "contact.thickness: 0.02 m is 0.2 times the spacing of generate[0], 0.1 m: its folds tangle; use at least half \
+         of the spacing",
+    );
+    assert_eq!(warnings(&contact(0.05, "surfaces")), Vec::<String>::new());
     // A figure has gaps between its limbs.
     let figure = contact(0.1, "particles")
         .replace(SHEET, "[[generate]]\nshape = \"ragdoll\"\nheight = 1.7\n");

@@ -45,7 +45,7 @@ pub(crate) struct CheckArgs {
 #[command(
     after_help = "Vertices become particles. Edges become structural constraints and diagonals of faces become\n\
         shear constraints. Bend constraints join the corners on both sides of an edge; with --bending,\n\
-        hinges take their place, so the stiffness does not depend on the mesh. Faces without\n\
+        hinges take their place, whose rigidity does not depend on the size of the faces. Faces without\n\
         area, duplicate faces and vertices without a face are left out with a warning.\n\nExamples:\n  \
         sim-node import shirt.obj --pin 'y > 1.45' -o shirt.toml && sim-node run ./shirt.toml\n  \
         sim-node import skirt.obj --scale 0.01 --pin 'y > 0.95' -o skirt.toml\n  \

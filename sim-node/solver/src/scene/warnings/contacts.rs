@@ -26,6 +26,12 @@ const REACH_MAX: f64 = 2.0;
 const RATIO_MIN: f64 = 0.75;
 const TOO_THIN: &str = "other particles pass between its particles; use at least three quarters of the spacing, or \
                         mode = \"surfaces\" for cloth";
+/// The same for surfaces, whose folds tangle: a sheet of 24 x 24 that falls on its edge crosses itself in no place at
+/// 0.5, and in hundreds at 0.05.
+const SURFACE_RATIO_MIN: f64 = 0.5;
+const TOO_THIN_SURFACE: &str = "its folds tangle; use at least half of the spacing";
+/// Thickness, in spacings, from which a sheet on a ball can be thrown apart.
+const RATIO_MAX: f64 = 3.0;
 /// Cosine of the angle between the normals of opposite sides. An edge of 25 degrees is no corner to cut off.
 const OPPOSITE: f32 = -0.9;
 /// Part of a segment's length by which it is shifted off an edge that it may pass through.
@@ -185,18 +191,19 @@ pub(super) fn thickness(scene: &Scene, model: &Model) -> Vec<String> {
         let spacing = mean_spacing(own).filter(|_| generator.contact)?;
         let ratio = f64::from(thickness) / spacing;
         let consequence = if f64::from(CONNECTED_REACH) * ratio >= REACH_MAX {
-            too_thick(thickness, &scene.unit)
-        } else if ratio < RATIO_MIN
-            && scene.contact.mode == ContactMode::Particles
-            && is_closed(&generator.shape)
-        {
-            TOO_THIN.to_owned()
+            too_thick(thickness, ratio, &scene.unit)
         } else {
-            return None;
+            too_thin(ratio, scene.contact.mode, &generator.shape)?.to_owned()
         };
+        let source = shortest_edge(own).filter(|edge| edge.rest_length == thickness && ratio < 1.0);
+        let source = source.map_or_else(String::new, |Constraint { a, b, .. }| {
+            format!(", the length of its shortest edge, between particles {a} and {b},")
+        });
         Some(format!(
-            "contact.thickness: {thickness} {unit} is {ratio:.1} times the spacing of generate[{index}], {} \
-             {unit}: {consequence}",
+            "contact.thickness: {} {unit}{source} is {} times the spacing of generate[{index}], {} {unit}: \
+             {consequence}",
+            three_digits(f64::from(thickness)),
+            three_digits(ratio),
             three_digits(spacing),
             unit = scene.unit,
         ))
@@ -209,12 +216,27 @@ fn is_closed(shape: &Shape) -> bool {
     matches!(shape, Shape::Cloth(_) | Shape::Mesh(_) | Shape::Rope(_) | Shape::Obj(_))
 }
 
-fn too_thick(thickness: f32, unit: &str) -> String {
+fn too_thick(thickness: f32, ratio: f64, unit: &str) -> String {
+    let thrown = if ratio >= RATIO_MAX { ", and what touches can be thrown apart" } else { "" };
     format!(
-        "its particles that are nearer than {} {unit} at load never touch, so small folds pass through themselves; \
-         use at most the spacing",
+        "its particles that are nearer than {} {unit} at load never touch, so small folds pass through \
+         themselves{thrown}; use at most the spacing",
         three_digits(f64::from(CONNECTED_REACH * thickness)),
     )
+}
+
+/// Returns the consequence of a thickness of `ratio` spacings, if it is too small for a shape.
+fn too_thin(ratio: f64, mode: ContactMode, shape: &Shape) -> Option<&'static str> {
+    // The particles of a rope touch each other in both modes.
+    let has_surface = mode == ContactMode::Surfaces && !matches!(shape, Shape::Rope(_));
+    let (ratio_min, consequence) =
+        if has_surface { (SURFACE_RATIO_MIN, TOO_THIN_SURFACE) } else { (RATIO_MIN, TOO_THIN) };
+    (ratio < ratio_min && is_closed(shape)).then_some(consequence)
+}
+
+fn shortest_edge(constraints: &[Constraint]) -> Option<&Constraint> {
+    let edges = constraints.iter().filter(|one| one.kind == ConstraintKind::Structural);
+    edges.min_by(|a, b| a.rest_length.total_cmp(&b.rest_length))
 }
 
 /// Mean rest length of the structural constraints.
