@@ -44,6 +44,9 @@ fn a_damaged_recording_is_found_repaired_and_verified() {
     assert_eq!(verified["verdict"], "identical", "{verified}");
     assert_eq!(verified["lost"]["/particles"], report["lost"]["/particles"]);
     assert_eq!(verified["last_identical_step"], 2400);
+    let played = recorder(&sandbox, &["play", &repaired, "--rate", "max"]);
+    let lacks = format!("{repaired} lacks {} snapshots between", report["lost"]["/particles"]);
+    assert!(played.code == Some(0) && played.stderr.contains(&lacks), "{}", played.stderr);
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use recorder::{
     CollidersRow, ContentSelection, FileSource, Frame, FrameReader, LogEnd, LogReader, Message,
-    RunDescription, Tape, recorded_scene, torn_before_first,
+    RunDescription, StepRow, Tape, recorded_scene, torn_before_first,
 };
 use sim_contract::{BendState, Method, Stop};
 use sim_solver::Solver;
@@ -14,6 +14,7 @@ use super::complete_state::keyframe_of;
 use super::position::Position;
 use super::replay::Recorded;
 use crate::cli::damaged_input::lacks;
+use crate::cli::output;
 
 /// A recording that is read forward from any step.
 #[derive(Debug)]
@@ -25,6 +26,10 @@ pub(super) struct Recording {
     collider_count: Option<usize>,
     /// `None` until a load is published.
     needs: Option<Needs>,
+    /// The header of the last snapshot that was read.
+    last_row: Option<StepRow>,
+    /// A warning has named a gap in the file.
+    has_named_gap: bool,
     stop: Stop,
 }
 
@@ -83,6 +88,8 @@ impl Recording {
             tape,
             collider_count,
             needs: None,
+            last_row: None,
+            has_named_gap: false,
             stop: stop.clone(),
         })
     }
@@ -149,6 +156,7 @@ impl Recording {
         let mut position = Position::new(torn, self.method());
         // The load has the parameters of its first snapshot.
         frame.updates.iter().for_each(|update| position.apply_parameters(update));
+        self.last_row = Some(frame.row);
         Ok(Start { frame, position })
     }
 
@@ -168,6 +176,7 @@ impl Recording {
         };
         let position = Position::at(&state, keyframe, self.method());
         self.tape.wind(&mut self.frames, step)?;
+        self.last_row = Some(state.row);
         let frame = Frame {
             updates: Vec::new(),
             row: state.row,
@@ -183,9 +192,33 @@ impl Recording {
         keyframe_of(&self.path, &mut self.tape, step, &self.stop)
     }
 
-    /// Returns the next snapshot, or `None` at the end of the readable part.
+    /// Returns the next snapshot, or `None` at the end of the readable part. Warns of the first gap before one,
+    /// because a replay numbers its snapshots anew.
     pub(super) fn next_frame(&mut self) -> anyhow::Result<Option<Frame>> {
-        Ok(self.frames.next_frame()?)
+        let frame = self.frames.next_frame()?;
+        if let Some(frame) = &frame {
+            let last = self.last_row.replace(frame.row);
+            if let Some(last) = last.filter(|_| !self.has_named_gap) {
+                self.warn_of_gap(&last, &frame.row);
+            }
+        }
+        Ok(frame)
+    }
+
+    fn warn_of_gap(&mut self, last: &StepRow, row: &StepRow) {
+        // Older formats do not number their snapshots.
+        let indexes = last.snapshot_index.zip(row.snapshot_index);
+        let missing =
+            indexes.map_or(0, |(last, next)| self.selection().missing_between(last, next));
+        if missing == 0 {
+            return;
+        }
+        self.has_named_gap = true;
+        let (path, from, to) = (output::path_text(&self.path), last.step, row.step);
+        output::note(&format!(
+            "warning: {path} lacks {missing} snapshots between steps {from} and {to}, and possibly more later; \
+             `recorder info` counts them all, and a recording of this replay will not know of them"
+        ));
     }
 
     /// Returns the messages after the last snapshot, once [`Self::next_frame`] has returned `None`.
