@@ -387,3 +387,27 @@ fn contacts_of_shapes_that_all_refuse_them_cause_a_warning() {
     let particle = "[[particle]]\nposition = [5, 5, 5]\n";
     assert_eq!(warnings(&format!("{scene}{particle}")), Vec::<String>::new());
 }
+
+#[test]
+fn a_damping_that_leaves_nothing_of_a_velocity_causes_a_warning() {
+    let scene = |damping: f32| {
+        format!("[solver]\nrate_hz = 240\nsubsteps = 4\ndamping = {damping}\n{SHEET}")
+    };
+    assert_warns(
+        &scene(2000.0),
+        "damping = 2000 1/s leaves nothing of a velocity: from 960 1/s on, one divided by the length of a substep, \
+         particles only creep",
+    );
+    assert_eq!(warnings(&scene(900.0)), Vec::<String>::new());
+}
+
+#[test]
+fn a_sheet_on_a_line_causes_a_warning() {
+    for right in ["[0, 0, 0]", "[0, -1, 0]", "[0, 3, 0]"] {
+        assert_warns(
+            &format!("{SHEET}right = {right}\n"),
+            "generate[0]: right and down are parallel, or one of them is zero, so all particles of the sheet are on one line",
+        );
+    }
+    assert_eq!(warnings(&format!("{SHEET}right = [1, 0.5, 0]\n")), Vec::<String>::new());
+}

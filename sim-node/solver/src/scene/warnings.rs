@@ -22,6 +22,7 @@ impl Scene {
             particles::inside_collider(self, &model),
             settings::listed_order(self),
             settings::no_tether_root(self, &model),
+            settings::excessive_damping(self),
             settings::upside_down(self),
             settings::gravity_of_meters(self),
             settings::wind_without_surface(self, &model),
@@ -42,6 +43,7 @@ impl Scene {
         warnings.extend(bending::unreached(self, &model));
         warnings.extend(bending::missing_hinges(self));
         warnings.extend(shapes::without_length(self));
+        warnings.extend(shapes::on_a_line(self));
         warnings.extend(shapes::without_pins(self));
         warnings.extend(shapes::loose_faces(self));
         warnings.extend(self.read_warnings.iter().cloned());

@@ -1,5 +1,6 @@
 //! Warnings about settings that do nothing, or the opposite of what they say.
 
+use super::rounded::three_digits;
 use crate::scene::definition::Scene;
 use crate::scene::definition::contact::ContactMode;
 use crate::scene::definition::settings::{ConstraintOrder, Up};
@@ -16,6 +17,18 @@ pub(super) fn no_tether_root(scene: &Scene, model: &Model) -> Option<String> {
         || model.particles.iter().any(|particle| particle.pinned);
     (scene.solver.has_tethers() && !has_root)
         .then(|| "tethers have no effect: no particle is pinned or anchored".to_owned())
+}
+
+/// Damping that leaves nothing of a velocity.
+pub(super) fn excessive_damping(scene: &Scene) -> Option<String> {
+    let (damping, h) = (scene.solver.damping, scene.solver.h());
+    (damping * h >= 1.0).then(|| {
+        format!(
+            "damping = {damping} 1/s leaves nothing of a velocity: from {} 1/s on, one divided by the length of a substep, \
+             particles only creep",
+            three_digits(1.0 / f64::from(h))
+        )
+    })
 }
 
 pub(super) fn upside_down(scene: &Scene) -> Option<String> {

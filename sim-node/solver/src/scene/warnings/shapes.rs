@@ -2,9 +2,14 @@
 
 use std::collections::HashSet;
 
+use glam::Vec3;
+
 use crate::scene::definition::Scene;
 use crate::scene::generate::pinned::Pinned;
 use crate::scene::generate::{Generator, Shape};
+
+/// Sine of the smallest angle between the sides of a sheet.
+const AREA_MIN: f64 = 1e-6;
 
 /// Warns of ropes and bridges whose ends coincide.
 pub(super) fn without_length(scene: &Scene) -> Option<String> {
@@ -20,6 +25,25 @@ pub(super) fn without_length(scene: &Scene) -> Option<String> {
         "generate[{index}]: the {name} has no length, because from and to are equal: all of its \
          constraints keep their ends together"
     ))
+}
+
+/// Warns of sheets whose rows and columns have one direction.
+pub(super) fn on_a_line(scene: &Scene) -> Vec<String> {
+    let sentence = |(index, generator): (usize, &Generator)| {
+        let (right, down) = match &generator.shape {
+            Shape::Cloth(cloth) if cloth.columns > 1 && cloth.rows > 1 => (cloth.right, cloth.down),
+            _ => return None,
+        };
+        let [right, down] = [right, down].map(|vector| Vec3::from_array(vector).as_dvec3());
+        let area = right.cross(down).length();
+        (area <= AREA_MIN * right.length() * down.length()).then(|| {
+            format!(
+                "generate[{index}]: right and down are parallel, or one of them is zero, so all particles of the sheet \
+                 are on one line"
+            )
+        })
+    };
+    scene.generators.iter().enumerate().filter_map(sentence).collect()
 }
 
 /// Warns of lists and expressions for particles that match none.
