@@ -160,6 +160,11 @@ impl Feed {
         self.accepted.end.is_some()
     }
 
+    /// Returns the number of the newest file, from 0.
+    pub(crate) fn file_number(&self) -> u64 {
+        self.file.map_or(0, |file| file.number)
+    }
+
     /// Returns the run in the file, once one has begun.
     pub(crate) fn run_id(&self) -> Option<u64> {
         self.intake.run_id()

@@ -26,6 +26,8 @@ const BYTES_PER_MB: f64 = 1e6;
 struct Progress {
     /// Time since the start, in s.
     seconds: f64,
+    /// Number of the newest file, from 0, which the next fields describe.
+    file: u64,
     /// Number of snapshots in the newest file, of which some can wait in the queue.
     snapshots: u64,
     /// Size of the newest file so far, without its open chunk.
@@ -93,16 +95,16 @@ impl LiveLine {
         if !self.has_progress {
             return Ok(true);
         }
-        let progress = Progress::new(seconds, &closing, size_bytes);
+        let progress = Progress::new(seconds, feed.file_number(), &closing, size_bytes);
         let line = format!("{}\n", serde_json::to_string(&progress)?);
         console::write_part(line.as_bytes()).context("cannot write to stdout")
     }
 }
 
 impl Progress {
-    fn new(seconds: f64, closing: &Closing, size_bytes: u64) -> Self {
+    fn new(seconds: f64, file: u64, closing: &Closing, size_bytes: u64) -> Self {
         let snapshots = closing.counts[Topic::Steps].received;
-        Self { seconds, snapshots, size_bytes, lost: closing.missing() }
+        Self { seconds, file, snapshots, size_bytes, lost: closing.missing() }
     }
 }
 
@@ -161,10 +163,10 @@ mod tests {
         let mut closing = Closing::default();
         closing.counts[Topic::Steps].received = 240;
         closing.counts[Topic::Particles].lost = 3;
-        let line = serde_json::to_string(&Progress::new(1.25, &closing, 4096)).unwrap();
+        let line = serde_json::to_string(&Progress::new(1.25, 2, &closing, 4096)).unwrap();
         assert_eq!(
             line,
-            r#"{"seconds":1.25,"snapshots":240,"size_bytes":4096,"lost":{"/particles":3}}"#
+            r#"{"seconds":1.25,"file":2,"snapshots":240,"size_bytes":4096,"lost":{"/particles":3}}"#
         );
     }
 

@@ -177,8 +177,7 @@ mod tests {
 
     #[test]
     fn the_lines_of_the_recorder_are_understood() {
-        let progress =
-            r#"{"seconds":1.25,"snapshots":240,"size_bytes":4096,"lost":{"/particles":3}}"#;
+        let progress = r#"{"seconds":1.25,"file":0,"snapshots":240,"size_bytes":4096,"lost":{"/particles":3}}"#;
         let Ok(Line::Progress(progress)) = serde_json::from_str(progress) else { panic!() };
         assert_eq!((progress.snapshots, progress.lost["/particles"]), (240, 3));
         let report = r#"{"output":"run.mcap","files":1,"snapshots":7,"lost":{},"stop_reason":"new scene loaded"}"#;
