@@ -173,6 +173,7 @@ impl Losses {
             // number of messages that the recorder wrote.
             if let Some(missing) = counts.written.checked_sub(written)
                 && had_end
+                && content.has_channels_of_today()
                 && topic != Topic::Tf
             {
                 self.counts[topic].lost = missing;

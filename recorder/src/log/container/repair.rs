@@ -81,7 +81,8 @@ pub fn repair_file<R: Read + Seek, W: Write>(
             continue;
         }
         if let Some(saved) = repair.add(part, &mut chunks)? {
-            repair.has_wrong_checksum = saved != 0 && saved != walk.checksum_before();
+            let is_wrong = saved != 0 && saved != walk.checksum_before();
+            repair.is_unexplained = is_wrong && repair.findings.count() == 0;
             walk.restart_checksum();
         }
         if let Some(limits) = repair.new_limits.take() {
@@ -128,7 +129,8 @@ struct Repair<W: Write> {
     salvage: Option<Salvage<W>>,
     closing: Option<Closing>,
     section: Section,
-    has_wrong_checksum: bool,
+    /// The checksum of the data is wrong, and no finding in them tells why.
+    is_unexplained: bool,
     first_step: Option<u64>,
     after_end: Option<AfterEnd>,
 }
@@ -153,7 +155,7 @@ impl<W: Write> Repair<W> {
             salvage: None,
             closing: None,
             section: Section::Data,
-            has_wrong_checksum: false,
+            is_unexplained: false,
             first_step: None,
             after_end: None,
         }
@@ -482,9 +484,7 @@ impl<W: Write> Repair<W> {
         let (_, losses) = salvage.finish(self.closing.take(), &mut content, &mut metadata)?;
         let last = content.last_row().map(|row| row.step);
         Ok(RepairReport {
-            is_uncertain: self.has_wrong_checksum
-                && losses.is_empty()
-                && self.findings.count() == 0,
+            is_uncertain: self.is_unexplained && losses.is_empty(),
             findings: self.findings,
             counts: content.counts,
             steps: self.first_step.zip(last).map(|(first, last)| [first, last]),
