@@ -50,7 +50,7 @@ pub fn find_state<R: Read>(
 ) -> Result<StatePlace, FindStateError> {
     let mut frames = FrameReader::new(log);
     let (mut found, mut keyframe_step) = (None, None);
-    // The snapshots beside the wanted step.
+    // The nearest snapshots before and after the wanted step.
     let (mut before, mut behind) = (None, None);
     while let Some(frame) = frames.next_frame()? {
         let step = frame.row.step;

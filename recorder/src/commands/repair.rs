@@ -174,6 +174,18 @@ impl<'a> Repaired<'a> {
     }
 }
 
+impl Repaired<'_> {
+    /// Returns `true` if something is lost, and no topic, step or other name tells what.
+    fn has_unknown_loss(&self) -> bool {
+        !self.is_lossless
+            && !self.is_uncertain
+            && self.lost.is_empty()
+            && self.lost_steps.is_empty()
+            && self.lost_head.is_none()
+            && self.after_end.is_none()
+    }
+}
+
 impl fmt::Display for Repaired<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let output = printable_line(&self.output);
@@ -222,6 +234,9 @@ impl fmt::Display for Repaired<'_> {
             self.lost.iter().map(|(topic, count)| format!("{topic} {count}")).collect();
         if !lost.is_empty() {
             write!(f, "\nmissing     messages: {}", lost.join(", "))?;
+        }
+        if self.has_unknown_loss() {
+            write!(f, "\nmissing     the damaged part, whose content is unknown")?;
         }
         Ok(())
     }

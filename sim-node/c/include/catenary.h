@@ -1070,8 +1070,8 @@ catenary_result catenary_next_turn(catenary_client *client,
 // Ends the turn that `catenary_next_turn` has begun.
 catenary_result catenary_ready(catenary_client *client);
 
-// Gets the number of turns that the node has computed without this client since it joined, because it was
-// not ready in time. Turns of a replay are not counted.
+// Gets the number of turns that the node has computed without this client since it joined, up to the last turn
+// of `catenary_next_turn`, because it was not ready in time. Turns of a replay are not counted.
 catenary_result catenary_missed_turns(catenary_client *client,
                                       uint64_t *count);
 

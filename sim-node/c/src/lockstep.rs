@@ -50,8 +50,8 @@ pub extern "C" fn catenary_ready(client: *mut ClientHandle) -> CatenaryResult {
     with_client(client, |attached| Ok(attached.client.ready()?))
 }
 
-/// Gets the number of turns that the node has computed without this client since it joined, because it was
-/// not ready in time. Turns of a replay are not counted.
+/// Gets the number of turns that the node has computed without this client since it joined, up to the last turn
+/// of `catenary_next_turn`, because it was not ready in time. Turns of a replay are not counted.
 #[unsafe(no_mangle)]
 pub extern "C" fn catenary_missed_turns(
     client: *mut ClientHandle,

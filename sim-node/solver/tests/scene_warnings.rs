@@ -367,6 +367,12 @@ fn a_thickness_that_leaves_room_between_particles_causes_a_warning() {
          of the spacing",
     );
     assert_eq!(warnings(&contact(0.05, "surfaces")), Vec::<String>::new());
+    let rope = "[[generate]]\nshape = \"rope\"\ncount = 11\nfrom = [0, 0, 0]\nto = [1, 0, 0]\nmass = 0.01\n\
+                pinned = \"none\"\n";
+    let warned = warnings(&contact(0.02, "surfaces").replace(SHEET, &format!("{SHEET}{rope}")));
+    assert!(warned.iter().any(|one| {
+        one.ends_with("other particles pass between its particles; use at least three quarters of the spacing")
+    }));
     // A figure has gaps between its limbs.
     let figure = contact(0.1, "particles")
         .replace(SHEET, "[[generate]]\nshape = \"ragdoll\"\nheight = 1.7\n");

@@ -102,7 +102,7 @@ pub(crate) struct RecordArgs {
     #[command(flatten)]
     pub(super) file: FileArgs,
     /// Print a line of JSON four times a second, for a program that shows the progress: the seconds since the start,
-    /// and of the newest file its number, snapshots, size and losses. The recording then also ends, cleanly, when the
+    /// and of the newest file its number from 0, snapshots, size and losses. The recording then also ends, cleanly, when the
     /// reader of the lines has gone
     #[arg(long, conflicts_with = "black_box")]
     pub(super) progress: bool,

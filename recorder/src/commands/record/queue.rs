@@ -18,7 +18,7 @@ const WAKE_PART: usize = 4;
 const SPARE_BUFFERS_MAX: usize = 32;
 /// Spare buffers of any size: the writing thread returns one while the next snapshot arrives.
 const SPARE_BUFFERS_MIN: usize = 2;
-/// Most bytes of more spare buffers: those that wake the writing thread, and those of its open chunk.
+/// Most bytes of more spare buffers: more than wakes the writing thread and is in its open chunk.
 const SPARE_SIZE_BYTES_MAX: usize = 2 * WAKE_SIZE_BYTES;
 
 /// One or two messages to write.

@@ -115,11 +115,6 @@ impl ContentCheck {
         &self.run
     }
 
-    /// Returns the `log_time` of the newest sound message.
-    pub(super) fn newest_log_time_ns(&self) -> u64 {
-        self.log_time_ns
-    }
-
     /// Returns the newest sound snapshot.
     pub(super) fn last_row(&self) -> Option<&StepRow> {
         self.last_row.as_ref()

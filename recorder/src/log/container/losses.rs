@@ -169,9 +169,10 @@ impl Losses {
             let counts = &mut closing.counts[topic];
             let is_counted = topic != Topic::Tf || content.has_channels_of_today();
             let written = if is_counted { content.counts[topic].written } else { 0 };
-            // Damage may hide what it has taken, and a message may be there twice, but the end of the file has the
-            // number of messages that the recorder wrote.
-            if let Some(missing) = counts.written.checked_sub(written)
+            // The end of the file has the number of messages that were written. It is exact where damage hides messages,
+            // or a message is there twice.
+            let missing = counts.written.checked_sub(written).filter(|_| counts.written > 0);
+            if let Some(missing) = missing
                 && had_end
                 && content.has_channels_of_today()
                 && topic != Topic::Tf

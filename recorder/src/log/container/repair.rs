@@ -5,6 +5,7 @@
 //! sound, and says what it lacks: message counts in the metadata `recorder`, and ranges of steps in the
 //! metadata `repair`.
 
+mod long_attachment;
 mod message_index;
 
 use std::borrow::Cow;
@@ -15,7 +16,6 @@ use mcap::records::{Metadata, Record, op};
 use mcap::{Attachment, MAGIC};
 use sim_contract::Stop;
 
-use super::attachment::{Checksum, LongAttachment, WRONG_CHECKSUM};
 use super::chunk::{ChunkContent, InnerRecords, compression};
 use super::content::ContentCheck;
 use super::finding::{AfterEnd, Findings, RepairReport, record_name};
@@ -81,8 +81,8 @@ pub fn repair_file<R: Read + Seek, W: Write>(
             continue;
         }
         if let Some(saved) = repair.add(part, &mut chunks)? {
-            let is_wrong = saved != 0 && saved != walk.checksum_before();
-            repair.is_unexplained = is_wrong && repair.findings.count() == 0;
+            repair.has_wrong_checksum = saved != 0 && saved != walk.checksum_before();
+            repair.is_unexplained = repair.has_wrong_checksum && repair.findings.count() == 0;
             walk.restart_checksum();
         }
         if let Some(limits) = repair.new_limits.take() {
@@ -118,6 +118,10 @@ struct Repair<W: Write> {
     content: Option<ContentCheck>,
     /// The messages of the last chunk, to compare its message indexes with.
     places: Places,
+    /// Numbers of lost messages by channel, before any channel is declared.
+    undeclared: BTreeMap<u16, u64>,
+    /// Numbers of messages by channel, as the index of the file has them.
+    indexed: Option<BTreeMap<u16, u64>>,
     new_limits: Option<SizeLimits>,
     /// Attachments and metadata before the first chunk.
     head: Vec<Record<'static>>,
@@ -129,6 +133,7 @@ struct Repair<W: Write> {
     salvage: Option<Salvage<W>>,
     closing: Option<Closing>,
     section: Section,
+    has_wrong_checksum: bool,
     /// The checksum of the data is wrong, and no finding in them tells why.
     is_unexplained: bool,
     first_step: Option<u64>,
@@ -147,6 +152,8 @@ impl<W: Write> Repair<W> {
             selection: ContentSelection::default(),
             content: None,
             places: Places::default(),
+            undeclared: BTreeMap::new(),
+            indexed: None,
             new_limits: None,
             head: Vec::new(),
             head_size_bytes: 0,
@@ -155,6 +162,7 @@ impl<W: Write> Repair<W> {
             salvage: None,
             closing: None,
             section: Section::Data,
+            has_wrong_checksum: false,
             is_unexplained: false,
             first_step: None,
             after_end: None,
@@ -174,6 +182,8 @@ impl<W: Write> Repair<W> {
             Part::LongAttachment { .. } | Part::AfterEnd { .. } => Ok(None),
             Part::Skipped { byte, opcode } => {
                 self.lose(byte, record_name(opcode), "it is of another program")?;
+                // The opcode may be the damage.
+                self.begin_damage();
                 Ok(None)
             }
             Part::Damaged { bytes, cause } => {
@@ -181,9 +191,7 @@ impl<W: Write> Repair<W> {
                 let what = format!("{size_bytes} bytes are damaged: {cause}");
                 self.allow_scene(size_bytes);
                 self.lose(bytes.start, "damaged record", &what)?;
-                if self.section != Section::Index {
-                    self.section = Section::AfterDamage;
-                }
+                self.begin_damage();
                 Ok(None)
             }
             // A killed recorder leaves whole records.
@@ -198,36 +206,11 @@ impl<W: Write> Repair<W> {
         }
     }
 
-    /// Copies a long attachment in pieces. No message is missing without it.
-    fn add_long_attachment<R: Read + Seek>(
-        &mut self,
-        walk: &mut Walk<R>,
-        attachment: LongAttachment,
-        checksum: Checksum,
-    ) -> Result<(), RepairError> {
-        let LongAttachment { byte, header, data, .. } = attachment;
-        if self.content.is_none() {
-            return self.lose(
-                byte,
-                "attachment",
-                "it is too long to stand before the metadata 'run'",
-            );
+    /// The message indexes of an unreadable chunk may follow.
+    fn begin_damage(&mut self) {
+        if self.section != Section::Index {
+            self.section = Section::AfterDamage;
         }
-        self.begin()?;
-        let Some(salvage) = &mut self.salvage else { return Ok(()) };
-        if checksum == Checksum::Wrong {
-            self.findings.add(byte, "attachment", WRONG_CHECKSUM);
-            salvage.losses.add_attachment();
-            return Ok(());
-        }
-        salvage.start_attachment(data.end - data.start, header)?;
-        let mut at = data.start;
-        while at < data.end {
-            let block = walk.block(at..data.end)?;
-            salvage.put_attachment_bytes(block)?;
-            at += block.len() as u64;
-        }
-        Ok(salvage.finish_attachment()?)
     }
 
     /// Allows for a scene in a damaged part before the first message.
@@ -263,6 +246,9 @@ impl<W: Write> Repair<W> {
         chunks: &mut ChunkContent,
     ) -> Result<Option<u32>, RepairError> {
         if self.section == Section::Index {
+            if let Ok(Record::Statistics(statistics)) = mcap::parse_record(opcode, body) {
+                self.indexed = Some(statistics.channel_message_counts);
+            }
             return Ok(None);
         }
         if opcode == op::CHUNK {
@@ -390,7 +376,7 @@ impl<W: Write> Repair<W> {
         if self.salvage.is_none()
             && let Some(compression) = compression(body)
         {
-            self.format.compression = compression;
+            self.format.compression = Some(compression);
         }
         self.begin()?;
         self.section = if chunk.is_ok() { Section::Data } else { Section::AfterBadChunk };
@@ -433,7 +419,7 @@ impl<W: Write> Repair<W> {
         }
         self.begin()?;
         if matches!(record, Record::Message { .. }) {
-            self.declare_channels()?;
+            self.declare_lost_channels()?;
         }
         let (Some(salvage), Some(content)) = (&mut self.salvage, &mut self.content) else {
             return Ok(());
@@ -446,6 +432,10 @@ impl<W: Write> Repair<W> {
             },
             Record::Message { header, data } => {
                 let result = salvage.add_message(header, data, content)?;
+                if let Some(step) = salvage.take_dropped_row() {
+                    let what = format!("step {step}: its snapshot is missing");
+                    self.findings.add(byte, place, what);
+                }
                 self.first_step = self.first_step.or(content.last_row().map(|row| row.step));
                 result
             }
@@ -472,6 +462,10 @@ impl<W: Write> Repair<W> {
             return Err(self.no_run().into());
         }
         self.begin()?;
+        if !self.undeclared.is_empty() {
+            self.declare_lost_channels()?;
+        }
+        let closing = self.closing.take().map(|closing| self.without_damage(closing));
         let (Some(salvage), Some(mut content)) = (self.salvage.take(), self.content.take()) else {
             return Err(WriteError::Stopped.into());
         };
@@ -480,8 +474,8 @@ impl<W: Write> Repair<W> {
             ("source_size_bytes".to_owned(), self.size_bytes.to_string()),
             ("finding_count".to_owned(), self.findings.count().to_string()),
         ]);
-        let has_end = self.closing.is_some();
-        let (_, losses) = salvage.finish(self.closing.take(), &mut content, &mut metadata)?;
+        let has_end = closing.is_some();
+        let (_, losses) = salvage.finish(closing, &mut content, &mut metadata)?;
         let last = content.last_row().map(|row| row.step);
         Ok(RepairReport {
             is_uncertain: self.is_unexplained && losses.is_empty(),

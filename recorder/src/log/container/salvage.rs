@@ -52,8 +52,8 @@ struct LostStart {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Format {
     pub(super) library: String,
-    /// "", "lz4" or "zstd".
-    pub(super) compression: String,
+    /// "", "lz4" or "zstd". `None` if no chunk before the first intact part tells it.
+    pub(super) compression: Option<String>,
 }
 
 /// The output of a repair.
@@ -62,6 +62,8 @@ pub(super) struct Salvage<W: Write> {
     file: Option<Writer<NoSeek<W>>>,
     /// The header of a snapshot, until its payload has followed.
     row: Option<HeldRow>,
+    /// The step of the last header that was left out, because its payload is missing.
+    dropped_row: Option<u64>,
     /// The lost start of the recording, until the first message.
     lost_start: Option<LostStart>,
     /// The ids of the schemas and channels so far.
@@ -74,9 +76,9 @@ pub(super) struct Salvage<W: Write> {
 impl<W: Write> Salvage<W> {
     pub(super) fn create(out: W, format: &Format) -> Result<Self, WriteError> {
         // The level of a recording. Other compressions have none.
-        let (compression, level) = match format.compression.as_str() {
-            "" => (None, 0),
-            "lz4" => (Some(mcap::Compression::Lz4), 0),
+        let (compression, level) = match format.compression.as_deref() {
+            Some("") => (None, 0),
+            Some("lz4") => (Some(mcap::Compression::Lz4), 0),
             _ => (Some(mcap::Compression::Zstd), 1),
         };
         let file = WriteOptions::new()
@@ -91,6 +93,7 @@ impl<W: Write> Salvage<W> {
         Ok(Self {
             file: Some(file),
             row: None,
+            dropped_row: None,
             lost_start: None,
             declared: BTreeSet::new(),
             declared_size_bytes: 0,
@@ -299,6 +302,7 @@ impl<W: Write> Salvage<W> {
         if topic == Some(Topic::Steps) && self.row.is_some() {
             // The payload of the header before it is missing.
             self.losses.add_message(Some(Topic::Particles));
+            self.dropped_row = content.row_step();
             self.drop_row(content);
         }
         match content.check(header, data) {
@@ -329,6 +333,11 @@ impl<W: Write> Salvage<W> {
             }
         }
         Ok(Ok(()))
+    }
+
+    /// Returns the step of a header that the last message has shown to be without its payload, once.
+    pub(super) fn take_dropped_row(&mut self) -> Option<u64> {
+        self.dropped_row.take()
     }
 
     /// Marks a part of the file as lost.

@@ -128,8 +128,11 @@ impl ContentSelection {
     }
 
     /// Returns how many snapshots between two recorded ones should be in the file and are not. Numbers
-    /// count modulo 2^32.
+    /// count modulo 2^32; none is missing before one that goes back, because the file has it twice.
     pub fn missing_between(&self, last_index: u32, index: u32) -> u64 {
+        if index.wrapping_sub(last_index).cast_signed() <= 0 {
+            return 0;
+        }
         let every = u64::from(self.every.get());
         let last = u64::from(last_index);
         let next = last + u64::from(index.wrapping_sub(last_index));

@@ -72,8 +72,8 @@ impl Client {
         }
         Err(LockstepError::not_admitted(&self.attachment, timeout))
     }
-    /// Returns the number of turns that the node has computed without this client since it joined. The node
-    /// goes on without a member that it has waited for longer than its `--lockstep-timeout`, and the member joins
+    /// Returns the number of turns that the node has computed without this client since it joined, up to the last
+    /// turn of [`Client::next_turn`]. Those at the start of a new run are not counted. The node goes on without a member that it has waited for longer than its `--lockstep-timeout`, and the member joins
     /// again with its next turn. Turns of a replay are not counted, because a recording may lack snapshots.
     pub fn missed_turns(&self) -> u64 {
         self.member.as_ref().map_or(0, Member::missed_turn_count)

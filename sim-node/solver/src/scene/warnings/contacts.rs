@@ -29,7 +29,11 @@ const TOO_THIN: &str = "other particles pass between its particles; use at least
 /// The same for surfaces, whose folds tangle: a sheet of 24 x 24 that falls on its edge crosses itself in no place at
 /// 0.5, and in hundreds at 0.05.
 const SURFACE_RATIO_MIN: f64 = 0.5;
+const TOO_THIN_ROPE: &str =
+    "other particles pass between its particles; use at least three quarters of the spacing";
 const TOO_THIN_SURFACE: &str = "its folds tangle; use at least half of the spacing";
+/// Rest lengths are f32 differences of coordinates, so their mean is not quite the spacing.
+const WITHOUT_ROUNDING: f64 = 0.999;
 /// Thickness, in spacings, from which a sheet on a ball can be thrown apart.
 const RATIO_MAX: f64 = 3.0;
 /// Cosine of the angle between the normals of opposite sides. An edge of 25 degrees is no corner to cut off.
@@ -195,9 +199,9 @@ pub(super) fn thickness(scene: &Scene, model: &Model) -> Vec<String> {
         } else {
             too_thin(ratio, scene.contact.mode, &generator.shape)?.to_owned()
         };
-        let source = shortest_edge(own).filter(|edge| edge.rest_length == thickness && ratio < 1.0);
+        let source = shortest_edge(&model.constraints).filter(|edge| edge.rest_length == thickness);
         let source = source.map_or_else(String::new, |Constraint { a, b, .. }| {
-            format!(", the length of its shortest edge, between particles {a} and {b},")
+            format!(", the length of the shortest edge, between particles {a} and {b},")
         });
         Some(format!(
             "contact.thickness: {} {unit}{source} is {} times the spacing of generate[{index}], {} {unit}: \
@@ -228,10 +232,12 @@ fn too_thick(thickness: f32, ratio: f64, unit: &str) -> String {
 /// Returns the consequence of a thickness of `ratio` spacings, if it is too small for a shape.
 fn too_thin(ratio: f64, mode: ContactMode, shape: &Shape) -> Option<&'static str> {
     // The particles of a rope touch each other in both modes.
-    let has_surface = mode == ContactMode::Surfaces && !matches!(shape, Shape::Rope(_));
-    let (ratio_min, consequence) =
-        if has_surface { (SURFACE_RATIO_MIN, TOO_THIN_SURFACE) } else { (RATIO_MIN, TOO_THIN) };
-    (ratio < ratio_min && is_closed(shape)).then_some(consequence)
+    let (ratio_min, consequence) = match (mode, shape) {
+        (_, Shape::Rope(_)) => (RATIO_MIN, TOO_THIN_ROPE),
+        (ContactMode::Surfaces, _) => (SURFACE_RATIO_MIN, TOO_THIN_SURFACE),
+        _ => (RATIO_MIN, TOO_THIN),
+    };
+    (ratio < ratio_min * WITHOUT_ROUNDING && is_closed(shape)).then_some(consequence)
 }
 
 fn shortest_edge(constraints: &[Constraint]) -> Option<&Constraint> {

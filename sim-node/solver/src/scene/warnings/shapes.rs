@@ -9,7 +9,7 @@ use crate::scene::generate::pinned::Pinned;
 use crate::scene::generate::{Generator, Shape};
 
 /// Sine of the smallest angle between the sides of a sheet.
-const AREA_MIN: f64 = 1e-6;
+const SINE_MIN: f64 = 1e-6;
 
 /// Warns of ropes and bridges whose ends coincide.
 pub(super) fn without_length(scene: &Scene) -> Option<String> {
@@ -36,7 +36,7 @@ pub(super) fn on_a_line(scene: &Scene) -> Vec<String> {
         };
         let [right, down] = [right, down].map(|vector| Vec3::from_array(vector).as_dvec3());
         let area = right.cross(down).length();
-        (area <= AREA_MIN * right.length() * down.length()).then(|| {
+        (area <= SINE_MIN * right.length() * down.length()).then(|| {
             format!(
                 "generate[{index}]: right and down are parallel, or one of them is zero, so all particles of the sheet \
                  are on one line"
