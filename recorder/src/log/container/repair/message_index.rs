@@ -16,19 +16,18 @@ impl<W: Write> Repair<W> {
         byte: u64,
         index: &MessageIndex,
     ) -> Result<(), RepairError> {
-        // Its size and place matter only for the index of the file, which is rewritten. Behind damage, it may be that
-        // of the last intact chunk, whose messages are not lost.
-        let is_of_chunk = match self.section {
-            Section::Data if !self.places.has_chunk() => return Ok(()),
-            Section::AfterBadChunk | Section::Index => Ok(false),
-            Section::Data | Section::AfterDamage => {
-                self.places.check_message_index(byte, 0, index).map(|()| true)
+        // Its size and place matter only for the index of the file, which is rewritten.
+        match self.section {
+            Section::Data => {
+                if self.places.has_chunk()
+                    && let Err(what) = self.places.check_message_index(byte, 0, index)
+                {
+                    self.findings.add_index(byte, "message index", what);
+                }
+                return Ok(());
             }
-        };
-        match (self.section, is_of_chunk) {
-            (_, Ok(true)) => return Ok(()),
-            (Section::Data, Err(what)) => {
-                self.findings.add_index(byte, "message index", what);
+            // It may be that of the last intact chunk, whose messages are not lost.
+            Section::AfterDamage if self.places.check_message_index(byte, 0, index).is_ok() => {
                 return Ok(());
             }
             _ => {}
