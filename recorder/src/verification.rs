@@ -51,7 +51,7 @@ pub fn verify<R: Read + Send>(
     let header = check_header(&log, &scene);
     // The reading thread ends when the verification is dropped, at the latest after its batch.
     thread::scope(|threads| {
-        let verification = Verification::start(threads, log, scene, options)?;
+        let verification = Verification::start(threads, log, &scene, options)?;
         report(verification, header, stop, on_progress)
     })
 }

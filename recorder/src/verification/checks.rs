@@ -78,7 +78,8 @@ pub(super) struct Verification {
     pub(super) frames: ReadAhead,
     run: RunDescription,
     format_version: u32,
-    scene: Scene,
+    /// The scene at load.
+    loaded: Solver,
     colliders: SceneColliders,
     threads: usize,
     range: StepRange,
@@ -102,7 +103,7 @@ impl Verification {
     pub(super) fn start<'scope, R: Read + Send + 'scope>(
         threads: &'scope Scope<'scope, '_>,
         log: LogReader<R>,
-        scene: Scene,
+        scene: &Scene,
         options: VerifyOptions,
     ) -> Result<Self, VerifyError> {
         let is_simulated = log.run().epoch_ns == 0;
@@ -116,8 +117,8 @@ impl Verification {
             run: log.run().clone(),
             format_version: log.format_version(),
             frames: ReadAhead::start(threads, log).map_err(VerifyError::Thread)?,
-            colliders: SceneColliders::new(&scene),
-            scene,
+            colliders: SceneColliders::new(scene),
+            loaded: Solver::new(scene),
             threads: options.threads,
             range: options.range,
             simulation: None,
@@ -229,7 +230,7 @@ impl Verification {
         let mut rows = frame.updates.iter().filter(is_load).peekable();
         rows.peek()?;
         let run = &self.run;
-        let solver = Solver::new(&self.scene);
+        let solver = &self.loaded;
         for row in rows {
             let topic = row.topic();
             if self.load_topics.contains(&topic) {
@@ -239,11 +240,11 @@ impl Verification {
             if let Message::Topology(row) = row {
                 self.revision = Some(row.revision);
             }
-            if let Some(what) = compare_load(row, run, self.format_version, &solver) {
+            if let Some(what) = compare_load(row, run, self.format_version, solver) {
                 return Some(what);
             }
         }
-        compare_counts(run, self.format_version, &solver)
+        compare_counts(run, self.format_version, solver)
     }
 
     /// Checks the fields of tears and outcomes on which no state depends.
@@ -325,7 +326,8 @@ impl Verification {
         if frame.row.step < self.range.start {
             return Ok(None);
         }
-        let Some(mut start) = Resimulation::start(&self.scene, frame)? else { return Ok(None) };
+        let start = Resimulation::start_from(frame, || self.loaded.clone())?;
+        let Some(mut start) = start else { return Ok(None) };
         start.set_threads(self.threads);
         self.coverage.is_restored = frame.row.step > 0;
         Ok(Some(self.simulation.insert(start).compare_start(frame)))

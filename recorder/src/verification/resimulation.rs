@@ -37,7 +37,8 @@ pub enum ResimulationError {
 /// The re-simulation of a recording.
 #[derive(Debug)]
 pub struct Resimulation {
-    scene: Scene,
+    /// The scene at load, until the first state is compared, if that is step 0.
+    loaded: Option<Solver>,
     solver: Solver,
     /// The step of the solver's state.
     step: u64,
@@ -64,20 +65,29 @@ impl Resimulation {
     /// # Errors
     /// If the state is invalid.
     pub fn start(scene: &Scene, frame: &Frame) -> Result<Option<Self>, ResimulationError> {
+        Self::start_from(frame, || Solver::new(scene))
+    }
+
+    /// Starts at a snapshot with the solver of its scene at load, which `load` returns.
+    pub(super) fn start_from(
+        frame: &Frame,
+        load: impl FnOnce() -> Solver,
+    ) -> Result<Option<Self>, ResimulationError> {
         let step = frame.row.step;
         let Some(bytes) = frame.own_keyframe().filter(|_| frame.particles.is_some()) else {
             return Ok(None);
         };
         let keyframe =
             Keyframe::decode(bytes).map_err(|cause| ResimulationError::Keyframe { step, cause })?;
-        let mut solver = Solver::new(scene);
+        let mut solver = load();
+        let loaded = (step == 0).then(|| solver.clone());
         solver
             .restore(bytemuck::cast_slice(frame.payload()), &keyframe)
             .map_err(|cause| ResimulationError::State { step, cause })?;
         let next_index = frame.row.outcome_count;
         let past = PastStates::from_first(step, &solver);
         Ok(Some(Self {
-            scene: scene.clone(),
+            loaded,
             solver,
             step,
             added_step: step,
@@ -133,17 +143,22 @@ impl Resimulation {
         if let Some(finding) = self.add_updates(later) {
             return finding;
         }
-        self.compare_first(frame, rows)
+        let loaded = self.loaded.take();
+        self.compare_first(frame, rows, loaded.as_ref())
     }
 
-    fn compare_first(&self, frame: &Frame, mut rows: SideRows) -> SnapshotFinding {
-        let scene_state = (self.step == 0).then(|| Solver::new(&self.scene));
-        let expected = scene_state.as_ref().unwrap_or(&self.solver);
+    fn compare_first(
+        &self,
+        frame: &Frame,
+        mut rows: SideRows,
+        loaded: Option<&Solver>,
+    ) -> SnapshotFinding {
+        let expected = loaded.unwrap_or(&self.solver);
         let finding = compare(expected, frame);
         if finding != SnapshotFinding::Identical {
             return finding;
         }
-        if scene_state.is_none() {
+        if loaded.is_none() {
             rows.ignore_collider_velocities(expected);
         }
         let what = match rows.compare_all(expected) {
