@@ -79,9 +79,7 @@ pub fn find_state<R: Read>(
         let reason = match (before, behind) {
             (None, None) => return "has no snapshot".to_owned(),
             (None, Some(behind)) => format!("it begins with step {behind}"),
-            (Some(before), _) if before == step || keyframe_step.is_none() => {
-                "no keyframe precedes it".to_owned()
-            }
+            (Some(_), _) if keyframe_step.is_none() => "no keyframe precedes it".to_owned(),
             (Some(before), None) => format!("it ends with step {before}"),
             (Some(before), Some(behind)) => {
                 format!("the nearest snapshots are those of steps {before} and {behind}")

@@ -7,6 +7,9 @@ use integration_tests::{Finished, Process, Program, Sandbox, record, wait_for};
 use rustix::process::Signal;
 use serde_json::Value;
 
+/// Opcode of a message index.
+const MESSAGE_INDEX: u8 = 7;
+
 fn recorder(sandbox: &Sandbox, args: &[&str]) -> Finished {
     Process::run(Program::Recorder, sandbox, args)
 }
@@ -47,6 +50,28 @@ fn a_damaged_recording_is_found_repaired_and_verified() {
     let played = recorder(&sandbox, &["play", &repaired, "--rate", "max"]);
     let lacks = format!("{repaired} lacks {} snapshots between", report["lost"]["/particles"]);
     assert!(played.code == Some(0) && played.stderr.contains(&lacks), "{}", played.stderr);
+}
+
+/// Of a record that is not readable, nobody knows what it was.
+#[test]
+fn a_lost_part_without_a_known_message_is_named() {
+    let sandbox = Sandbox::new();
+    let path = sandbox.path("whole.mcap");
+    recorder(&sandbox, &["simulate", "curtain", "--steps", "480", "-o", &path]).success();
+    let mut bytes = fs::read(&path).unwrap();
+    // The records are an opcode, a length of 8 bytes, and as many bytes.
+    let mut place = 8;
+    while bytes[place] != MESSAGE_INDEX {
+        let length = u64::from_le_bytes(bytes[place + 1..place + 9].try_into().unwrap());
+        place += 9 + usize::try_from(length).unwrap();
+    }
+    bytes[place] = 0;
+    let damaged = sandbox.path("damaged.mcap");
+    fs::write(&damaged, bytes).unwrap();
+    let repaired = recorder(&sandbox, &["repair", &damaged, &sandbox.path("repaired.mcap")]);
+    assert_eq!(repaired.code, Some(3), "{}{}", repaired.stdout, repaired.stderr);
+    let end = "\nmissing     the damaged part, whose content is unknown\n";
+    assert!(repaired.stdout.ends_with(end), "{}", repaired.stdout);
 }
 
 #[test]

@@ -445,7 +445,7 @@ impl Check {
                     "{} messages on {name} are missing, but the file declares {declared}",
                     found[topic].gaps
                 );
-                self.findings.add_index(end, "metadata 'recorder'", what);
+                self.findings.add_missing(end, "metadata 'recorder'", what);
             }
             let is_counted = topic != Topic::Tf || content.has_channels_of_today();
             if is_counted && claimed.written != counted.written {
@@ -453,7 +453,11 @@ impl Check {
                     "it counts {} messages on {name}, but the file has {}",
                     claimed.written, counted.written
                 );
-                self.findings.add_index(end, "metadata 'recorder'", what);
+                if claimed.written > counted.written {
+                    self.findings.add_missing(end, "metadata 'recorder'", what);
+                } else {
+                    self.findings.add_index(end, "metadata 'recorder'", what);
+                }
             }
         }
     }

@@ -106,6 +106,8 @@ pub enum Cure {
     LeaveOut,
     /// The part is rewritten from the rest of the file. Nothing is missing.
     Rewrite,
+    /// Messages are missing, and the file does not say so. They are declared as missing.
+    Declare,
 }
 
 impl fmt::Display for Cure {
@@ -113,6 +115,7 @@ impl fmt::Display for Cure {
         formatter.write_str(match self {
             Self::LeaveOut => "`recorder repair` leaves it out and declares it as missing",
             Self::Rewrite => "`recorder repair` rewrites it",
+            Self::Declare => "`recorder repair` declares them as missing",
         })
     }
 }
@@ -154,6 +157,16 @@ impl Findings {
         what: impl Into<String>,
     ) {
         self.push(byte, record.into(), what.into(), Cure::Rewrite);
+    }
+
+    /// Adds a finding about messages that are missing, and that the file does not declare.
+    pub(super) fn add_missing(
+        &mut self,
+        byte: u64,
+        record: impl Into<String>,
+        what: impl Into<String>,
+    ) {
+        self.push(byte, record.into(), what.into(), Cure::Declare);
     }
 
     fn push(&mut self, byte: u64, record: String, what: String, cure: Cure) {
