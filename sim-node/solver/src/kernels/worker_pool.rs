@@ -19,8 +19,12 @@ pub const THREADS_MAX: u8 = 64;
 /// Largest number of workers in a pool.
 pub(crate) const WORKERS_MAX: usize = THREADS_MAX as usize;
 
-/// Checks for a job before a worker yields or parks, about ten microseconds.
-const SPINS: u32 = 1 << 9;
+/// Checks for a job before a worker yields or parks: 20 to 100 microseconds, depending on how long the processor pauses
+/// between two of them. To wake a parked worker takes as long, and most parts of a step that only one worker runs are
+/// shorter.
+const SPINS: u32 = 1 << 11;
+/// The same number if there are more workers than processors: another worker needs the processor.
+const SPINS_CROWDED: u32 = 1 << 6;
 
 /// A job, called with the index of the worker.
 type Job<'a> = dyn Fn(usize) + Sync + 'a;
@@ -43,6 +47,8 @@ struct JobSlot {
     is_shut_down: AtomicBool,
     /// By worker, without the first: it is parked, or about to park.
     is_parked: Vec<AtomicBool>,
+    /// Checks for a job before a worker yields or parks.
+    spins: u32,
 }
 
 /// A job whose lifetime is erased.
@@ -57,6 +63,8 @@ impl WorkerPool {
     /// if the system refuses a thread.
     pub(crate) fn new(workers: usize) -> Self {
         let others = workers.clamp(1, WORKERS_MAX) - 1;
+        let is_crowded =
+            thread::available_parallelism().is_ok_and(|processors| others >= processors.get());
         let slot = Arc::new(JobSlot {
             job_count: AtomicU64::new(0),
             job: JobCell(UnsafeCell::new(None)),
@@ -64,6 +72,7 @@ impl WorkerPool {
             has_panicked: AtomicBool::new(false),
             is_shut_down: AtomicBool::new(false),
             is_parked: (0..others).map(|_| AtomicBool::new(false)).collect(),
+            spins: if is_crowded { SPINS_CROWDED } else { SPINS },
         });
         let start = |worker: usize| {
             let slot = Arc::clone(&slot);
@@ -117,7 +126,7 @@ impl WorkerPool {
         let result = catch_unwind(AssertUnwindSafe(|| job(0)));
         let mut spins = 0;
         while slot.busy_count.load(Ordering::Acquire) > 0 {
-            back_off(&mut spins);
+            slot.back_off(&mut spins);
         }
         // SAFETY: every worker has finished.
         unsafe { *slot.job.0.get() = None };
@@ -128,13 +137,13 @@ impl WorkerPool {
     }
 }
 
-/// Spins at first, then yields the core.
-fn back_off(spins: &mut u32) {
-    *spins += 1;
-    if *spins < SPINS { spin_loop() } else { thread::yield_now() }
-}
-
 impl JobSlot {
+    /// Spins at first, then yields the core.
+    fn back_off(&self, spins: &mut u32) {
+        *spins += 1;
+        if *spins < self.spins { spin_loop() } else { thread::yield_now() }
+    }
+
     /// Runs jobs until the pool shuts down.
     fn serve(&self, worker: usize) {
         let mut done_count = 0;
@@ -159,7 +168,7 @@ impl JobSlot {
     /// Waits until more than `done_count` jobs were announced.
     fn wait(&self, worker: usize, done_count: u64) {
         let is_announced = || self.job_count.load(Ordering::SeqCst) != done_count;
-        for _ in 0..SPINS {
+        for _ in 0..self.spins {
             if is_announced() {
                 return;
             }

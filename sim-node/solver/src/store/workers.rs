@@ -14,8 +14,9 @@ pub(crate) struct Workers {
     scratches: Vec<WorkerScratch>,
 }
 
-/// Scratch memory of one worker.
+/// Scratch memory of one worker, in cache lines of its own, because each writes its own all the time.
 #[derive(Debug, Clone, Default)]
+#[repr(align(128))]
 pub(crate) struct WorkerScratch {
     pub(crate) contacts: Contacts,
     pub(crate) block: Box<ProjectionBlock>,
