@@ -168,6 +168,7 @@ impl Solver {
     pub fn set_threads(&mut self, threads: usize) {
         if threads != self.store.thread_count() {
             self.store.set_threads(threads);
+            self.particle_contacts.set_worker_count(self.store.thread_count());
         }
     }
 

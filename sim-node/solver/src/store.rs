@@ -15,7 +15,7 @@ mod pulls;
 mod rows;
 mod strays;
 mod survey;
-mod workers;
+pub(crate) mod workers;
 
 use bends::StoredBends;
 use crowd::{Crowd, find_figures};
@@ -24,7 +24,7 @@ use layout::Layout;
 pub(crate) use layout::{Configured, Location, SceneFields, TetherPlace};
 use patch::Patch;
 use patch::sheets::{Found, families_of, find_sheet, loose_particles, pure_sheets};
-pub(crate) use paths::{Paths, Progress};
+pub(crate) use paths::{Paths, Progress, StrayMarks};
 pub(crate) use pulls::{Receivers, TetherEnds};
 use rows::Rows;
 use survey::Survey;
@@ -68,6 +68,39 @@ pub(crate) struct ParticleStore {
     contact_room: ContactRoom,
 }
 
+/// The particles of a store.
+#[derive(Clone, Copy)]
+pub(crate) struct StoredParticles<'a> {
+    graph: &'a Graph,
+    patches: &'a [Patch],
+    crowds: &'a [Crowd],
+}
+
+impl<'a> StoredParticles<'a> {
+    /// The rows of a location; none in the graph.
+    #[inline(always)]
+    fn rows(self, location: Location) -> Option<&'a Rows> {
+        let rows = location.rows()?;
+        Some(match self.patches.get(rows) {
+            Some(patch) => &patch.rows,
+            None => &self.crowds[rows - self.patches.len()].rows,
+        })
+    }
+
+    /// Position, inverse mass and displacement of a particle.
+    #[inline(always)]
+    pub(crate) fn packed(self, location: Location) -> PackedParticle {
+        let index = location.index();
+        match self.rows(location) {
+            None => self.graph.packed_particle(index),
+            Some(rows) => {
+                let ([x, y, z], [dx, dy, dz]) = (rows.position(index), rows.displacement(index));
+                PackedParticle([x, y, z, rows.inverse_mass(index), dx, dy, dz, 0.0])
+            }
+        }
+    }
+}
+
 impl ParticleStore {
     pub(crate) fn new(model: &Model, orders: &ProjectionOrders, kernels: Kernels) -> Self {
         let is_structured = kernels != Kernels::Reference && orders.has_groups();
@@ -105,6 +138,18 @@ impl ParticleStore {
         store
     }
 
+    /// The workers, and the particles for them to read.
+    pub(crate) fn with_workers(&mut self) -> (&mut Workers, StoredParticles<'_>) {
+        let Self { workers, graph, patches, crowds, .. } = self;
+        (workers, StoredParticles { graph, patches, crowds })
+    }
+
+    /// The particles, to be read.
+    pub(crate) fn particles(&self) -> StoredParticles<'_> {
+        let Self { graph, patches, crowds, .. } = self;
+        StoredParticles { graph, patches, crowds }
+    }
+
     fn writer(&mut self, location: Location) -> ColumnWriter<'_> {
         let sheet_count = self.patches.len();
         match location.rows() {
@@ -117,11 +162,7 @@ impl ParticleStore {
     /// The rows of a location; none in the graph.
     #[inline(always)]
     fn rows(&self, location: Location) -> Option<&Rows> {
-        let rows = location.rows()?;
-        Some(match self.patches.get(rows) {
-            Some(patch) => &patch.rows,
-            None => &self.crowds[rows - self.patches.len()].rows,
-        })
+        self.particles().rows(location)
     }
 
     fn rows_mut(&mut self, location: Location) -> Option<&mut Rows> {
@@ -298,19 +339,6 @@ impl ParticleStore {
         match self.rows_mut(location) {
             None => self.graph.set_displacement(index, displacement),
             Some(rows) => rows.set_displacement(index, displacement),
-        }
-    }
-
-    /// Position, inverse mass and displacement of a particle.
-    #[inline(always)]
-    pub(crate) fn packed_particle(&self, location: Location) -> PackedParticle {
-        let index = location.index();
-        match self.rows(location) {
-            None => self.graph.packed_particle(index),
-            Some(rows) => {
-                let ([x, y, z], [dx, dy, dz]) = (rows.position(index), rows.displacement(index));
-                PackedParticle([x, y, z, rows.inverse_mass(index), dx, dy, dz, 0.0])
-            }
         }
     }
 

@@ -121,7 +121,7 @@ impl BodyContacts {
         let zone = solid.zone();
         self.candidates.clear();
         for (particle, location) in (0_u32..).zip(&self.locations) {
-            let PackedParticle([x, y, z, _, dx, dy, dz, _]) = store.packed_particle(*location);
+            let PackedParticle([x, y, z, _, dx, dy, dz, _]) = store.particles().packed(*location);
             if zone.may_meet([x, y, z], [dx, dy, dz]) {
                 self.candidates.push(particle);
             }
@@ -156,7 +156,7 @@ struct Meeting<'a> {
 impl Meeting<'_> {
     fn path(&self) -> (SubstepPath, f32) {
         let PackedParticle([x, y, z, inverse_mass, dx, dy, dz, _]) =
-            self.store.packed_particle(self.location);
+            self.store.particles().packed(self.location);
         let path = SubstepPath { start: Vec3::new(x, y, z), displacement: Vec3::new(dx, dy, dz) };
         (path, inverse_mass)
     }

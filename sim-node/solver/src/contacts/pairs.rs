@@ -8,6 +8,7 @@
 //! Where cloths touch as surfaces, a particle and a triangle take the place of most pairs.
 
 mod box_tree;
+mod gathered;
 mod lane_bounds;
 mod load;
 pub(crate) mod order;
@@ -18,6 +19,7 @@ mod tile;
 mod tile_tree;
 
 use box_tree::Search;
+use gathered::{Gathered, Room};
 pub(crate) use load::CONNECTED_REACH;
 use load::{LaneMasks, LoadPairs};
 use order::{order_by_key, order_key};
@@ -32,7 +34,8 @@ use crate::scene::definition::contact::ContactMode;
 use crate::scene::model::Model;
 use crate::state::tear::Torn;
 use crate::step::substep::Substep;
-use crate::store::{Location, ParticleStore, Paths, Progress};
+use crate::store::workers::Workers;
+use crate::store::{Location, ParticleStore, Paths, Progress, StoredParticles, StrayMarks};
 
 /// Pairs within this number of contact distances at the start of the stage take part in it, because
 /// another contact may push them together.
@@ -50,6 +53,11 @@ const STRAY_PART_MAX: f32 = 0.5;
 /// Largest number of candidates for each particle, on average. It bounds the time of a step in which
 /// particles pile up in one point.
 const CANDIDATES_PER_PARTICLE: usize = 8;
+
+/// Fewest particles that a worker loads.
+const LOADED_MIN: usize = 512;
+/// Fewest candidates that a worker examines.
+const NEAR_MIN: usize = 256;
 
 /// Finds and resolves the contacts of particles with each other. Empty while they are off.
 #[derive(Debug, Clone, Default)]
@@ -79,15 +87,18 @@ pub(crate) struct ParticleContacts {
     paths_begin_at: Option<Substep>,
     /// True if the newest search has found all candidates.
     is_complete: bool,
-    pair_count_max: usize,
+    /// By worker, without the first: the marks of strays that it sets.
+    strays_of_others: Vec<Vec<u16>>,
     /// In the order of the search.
-    candidates: Vec<Pair>,
+    candidates: Gathered<Pair>,
     /// The candidates in the order of contact. A merge uses it for those in the order of the search.
     ordered: Vec<Pair>,
+    /// By tile: a bit for each particle.
+    members: Vec<u32>,
     /// By tile: a bit for each particle that is part of a candidate.
     involved: Vec<u32>,
     /// The pairs of the running substep, in the order of contact.
-    near: Vec<Pair>,
+    near: Gathered<Pair>,
     /// By tile: a bit for each particle that the running substep may have pushed.
     touched: Vec<u32>,
     /// Number of searches that were given up because there were too many candidates.
@@ -118,6 +129,8 @@ impl ParticleContacts {
             candidate_count_max
         };
         let states = vec![PackedParticle([f32::NAN; 8]); count.next_multiple_of(TILE)];
+        let mut members = vec![0; count.div_ceil(TILE)];
+        mark(&mut members, (0..).take(count));
         Self {
             thickness,
             margin: MARGIN * thickness,
@@ -129,17 +142,18 @@ impl ParticleContacts {
                 if has_surfaces { without_corners([0; TILE], &loose, tiles) } else { [0; TILE] }
             }),
             loose,
-            pair_count_max,
             surfaces: surfaces.unwrap_or_default(),
             tree: TileTree::new(count),
             particles,
             paths_begin_at: None,
             is_complete: false,
-            candidates: Vec::with_capacity(pair_count_max),
+            strays_of_others: Vec::new(),
+            candidates: Gathered::new(pair_count_max),
             ordered: Vec::with_capacity(pair_count_max),
+            members,
             involved: vec![0; count.div_ceil(TILE)],
             touched: vec![0; count.div_ceil(TILE)],
-            near: Vec::with_capacity(pair_count_max),
+            near: Gathered::new(pair_count_max),
             overflow_count: 0,
         }
     }
@@ -153,16 +167,25 @@ impl ParticleContacts {
         self.thickness.to_bits() == thickness.unwrap_or(0.0).to_bits()
     }
 
-    /// Updates the locations of the particles.
+    /// Updates the locations of the particles, and makes room for what each worker finds.
     pub(crate) fn locate(&mut self, store: &ParticleStore) {
         if self.are_on() {
             store.prepare_paths(&mut self.paths);
+            self.set_worker_count(store.thread_count());
         }
         let slots = self.locations.iter_mut().zip(&self.particles);
         for (slot, (location, particle)) in (0_u32..).zip(slots) {
             *location = store.location(*particle);
             store.set_slot(&mut self.paths, *location, slot);
         }
+    }
+
+    /// Makes room for what each of these workers finds.
+    pub(crate) fn set_worker_count(&mut self, count: usize) {
+        let tile_count = self.tree.tiles.len();
+        self.strays_of_others.resize_with(count - 1, || vec![0; tile_count]);
+        self.candidates.set_worker_count(count);
+        self.near.set_worker_count(count);
     }
 
     /// Forgets the candidates of the step before, and takes torn triangles out.
@@ -179,21 +202,28 @@ impl ParticleContacts {
         friction: f32,
     ) {
         let are_loaded = self.find_strays(store, substep) && self.find_candidates(store, substep);
-        if !are_loaded && self.surfaces.has_candidates() {
-            // They may come to other triangles.
-            self.load_all(store);
-        } else if !are_loaded {
-            self.load_involved(store);
+        let (workers, stored) = store.with_workers();
+        if !are_loaded {
+            // Candidates may come to other triangles.
+            let has_candidates = self.surfaces.has_candidates();
+            let wanted = if has_candidates { &self.members } else { &self.involved };
+            load(&mut self.states, wanted, (workers, stored, &self.locations));
         }
         let Self { states, ordered, near, surfaces, thickness, .. } = self;
-        near.clear();
-        near.extend(ordered.iter().filter(|pair| pair.is_near(states, REACH)));
-        for pair in &*near {
+        near.items.clear();
+        let part_length = workers.part_length(ordered.len(), NEAR_MIN);
+        let _has_room = near.extend(workers, (ordered, part_length), |pairs, near| {
+            pairs
+                .iter()
+                .filter(|pair| pair.is_near(states, REACH))
+                .try_for_each(|pair| near.add(*pair))
+        });
+        for pair in &near.items {
             pair.push_apart(states, friction);
         }
-        surfaces.push_apart(states, (*thickness, REACH), (friction, store.kernels()));
+        surfaces.push_apart(states, (*thickness, REACH), (friction, workers));
         self.touched.fill(0);
-        let slots = near.iter().flat_map(|pair| pair.slots);
+        let slots = near.items.iter().flat_map(|pair| pair.slots);
         mark(&mut self.touched, slots.chain(surfaces.touched()));
         self.save_touched(store);
     }
@@ -209,24 +239,9 @@ impl ParticleContacts {
         }
     }
 
-    fn load_all(&mut self, store: &ParticleStore) {
-        for (state, location) in self.states.iter_mut().zip(&self.locations) {
-            *state = store.packed_particle(*location);
-        }
-    }
-
-    fn load_involved(&mut self, store: &ParticleStore) {
-        for (tile, mut lanes) in self.involved.iter().copied().enumerate() {
-            while let Some(lane) = take_lowest(&mut lanes) {
-                let slot = TILE * tile + lane as usize;
-                self.states[slot] = store.packed_particle(self.locations[slot]);
-            }
-        }
-    }
-
     /// Finds the particles that are not where the candidates expect them at the end of the substep. Returns true if the
     /// candidates no longer hold.
-    fn find_strays(&mut self, store: &ParticleStore, substep: Substep) -> bool {
+    fn find_strays(&mut self, store: &mut ParticleStore, substep: Substep) -> bool {
         let Some(begin) = self.paths_begin_at else { return true };
         self.tree.strays.fill(0);
         let count = (substep.index - begin.index + 1) as f32;
@@ -234,12 +249,14 @@ impl ParticleContacts {
         let limit_max = 0.24 * self.margin * self.margin;
         let limit = STRAY_FROM * STRAY_FROM * limit_max;
         let progress = Progress { count, limit, limit_max };
-        store.mark_strays(&self.paths, progress, &mut self.tree.strays)
+        let strays =
+            StrayMarks { all: &mut self.tree.strays, of_others: &mut self.strays_of_others };
+        store.mark_strays(&self.paths, progress, strays)
     }
 
     /// Finds the candidates of strays for the rest of the step, and orders all. Returns true if it has loaded
     /// all particles.
-    fn find_candidates(&mut self, store: &ParticleStore, substep: Substep) -> bool {
+    fn find_candidates(&mut self, store: &mut ParticleStore, substep: Substep) -> bool {
         let stray_count = self.tree.strays.iter().filter(|lanes| **lanes != 0).count();
         let are_few = (stray_count as f32) < STRAY_PART_MAX * self.tree.tiles.len() as f32;
         // An incomplete search has left out candidates of others.
@@ -253,12 +270,13 @@ impl ParticleContacts {
             self.begin_paths(store, substep);
             0.0
         };
-        let kernels = store.kernels();
+        let (workers, _) = store.with_workers();
+        let kernels = workers.kernels;
         let span = substep.left() as f32;
         let times = [passed, passed + span];
         self.tree.refit(times, kernels);
         let distance = REACH * self.thickness + self.margin;
-        let mut is_complete = self.search(Query { times, distance }, kernels).is_continue();
+        let mut is_complete = self.search(Query { times, distance }, workers).is_continue();
         if self.surfaces.are_on() {
             let Self { tree, expected: states, particles, .. } = self;
             let begins_paths = begin.is_none();
@@ -281,15 +299,16 @@ impl ParticleContacts {
     }
 
     /// Gives all particles new paths, from this substep on.
-    fn begin_paths(&mut self, store: &ParticleStore, substep: Substep) {
+    fn begin_paths(&mut self, store: &mut ParticleStore, substep: Substep) {
         self.paths_begin_at = Some(substep);
         store.save_paths(&mut self.paths);
-        self.load_all(store);
-        self.tree.begin_paths(&self.states, store.kernels());
+        let (workers, stored) = store.with_workers();
+        load(&mut self.states, &self.members, (workers, stored, &self.locations));
+        self.tree.begin_paths(&self.states, workers.kernels);
         if self.surfaces.are_on() {
             self.expected.copy_from_slice(&self.states);
         }
-        self.candidates.clear();
+        self.candidates.items.clear();
     }
 
     /// Gives the strays the paths that they take after this number of displacements, and drops their candidates. Those of
@@ -297,7 +316,7 @@ impl ParticleContacts {
     fn follow_strays(&mut self, store: &ParticleStore, passed: f32) {
         let Self { tree, states, candidates, locations, paths, surfaces, expected, .. } = self;
         for slot in members(&tree.strays).map(|slot| slot as usize) {
-            states[slot] = store.packed_particle(locations[slot]);
+            states[slot] = store.particles().packed(locations[slot]);
         }
         tree.follow_strays(states, passed);
         for slot in members(&tree.strays).map(|slot| slot as usize) {
@@ -307,35 +326,30 @@ impl ParticleContacts {
         if surfaces.are_on() {
             tree.place(passed, store.kernels(), expected);
         }
-        candidates.retain(|pair| !pair.slots.iter().any(|slot| tree.is_stray(*slot)));
+        candidates.items.retain(|pair| !pair.slots.iter().any(|slot| tree.is_stray(*slot)));
     }
 
     /// Adds the candidates of strays, in the order of the search.
-    fn search(&mut self, query: Query, kernels: Kernels) -> Search {
-        let Self { tree, states, particles, load_pairs, loose, candidates, .. } = self;
-        let (thickness, count_max) = (self.thickness, self.pair_count_max);
-        let kept_count = candidates.len();
-        let mut accept = |slots: [u32; 2]| {
+    fn search(&mut self, query: Query, workers: &mut Workers) -> Search {
+        let Self { tree, states, particles, load_pairs, loose, candidates, thickness, .. } = self;
+        let kept_count = candidates.items.len();
+        let accept = |slots: [u32; 2], found: &mut Room<'_, Pair>| {
             let [a, b] = slots.map(|slot| slot as usize);
-            let distance = load_pairs.distance(slots, thickness);
+            let distance = load_pairs.distance(slots, *thickness);
             let is_free = states[a].0[3] + states[b].0[3] > 0.0;
             if !is_free {
                 return Search::Continue(());
             }
-            if candidates.len() == count_max {
-                return Search::Break(());
-            }
             let (a, b) = (particles[a], particles[b]);
             let key = order_key(a.min(b), a.max(b));
-            candidates.push(Pair { slots, distance, key });
-            Search::Continue(())
+            found.add(Pair { slots, distance, key })
         };
         let found = if loose.is_empty() {
             let except = |tiles| load_pairs.untouchable(tiles);
-            tree.search(query, kernels, &except, &mut accept)
+            tree.gather((query, workers), &except, (candidates, &accept))
         } else if loose.iter().any(|lanes| *lanes != 0) {
             let except = |tiles| without_corners(load_pairs.untouchable(tiles), loose, tiles);
-            tree.search(query, kernels, &except, &mut accept)
+            tree.gather((query, workers), &except, (candidates, &accept))
         } else {
             Search::Continue(())
         };
@@ -348,7 +362,7 @@ impl ParticleContacts {
         if kept_count == 0 {
             return;
         }
-        let Self { candidates, ordered, .. } = self;
+        let Self { candidates: Gathered { items: candidates, .. }, ordered, .. } = self;
         ordered.clear();
         let (kept, found) = candidates.split_at(kept_count);
         let mut kept = kept.iter().peekable();
@@ -364,10 +378,34 @@ impl ParticleContacts {
     }
 
     fn order_candidates(&mut self) {
-        order_by_key(&self.candidates, &mut self.ordered, |pair| pair.key);
+        let candidates = &self.candidates.items;
+        order_by_key(candidates, &mut self.ordered, |pair| pair.key);
         self.involved.fill(0);
-        mark(&mut self.involved, self.candidates.iter().flat_map(|pair| pair.slots));
+        mark(&mut self.involved, candidates.iter().flat_map(|pair| pair.slots));
     }
+}
+
+/// Loads the particles for which `wanted` has a bit, by tile.
+fn load(
+    states: &mut [PackedParticle],
+    wanted: &[u32],
+    (workers, stored, locations): (&mut Workers, StoredParticles<'_>, &[Location]),
+) {
+    let tile_count = workers.part_length(wanted.len(), LOADED_MIN / TILE);
+    let locations = locations.chunks(TILE * tile_count).zip(wanted.chunks(tile_count));
+    let parts = states.chunks_mut(TILE * tile_count).zip(locations);
+    workers.for_each(
+        parts,
+        |(states, (locations, wanted)), _| {
+            for (tile, mut lanes) in wanted.iter().copied().enumerate() {
+                while let Some(lane) = take_lowest(&mut lanes) {
+                    let slot = TILE * tile + lane as usize;
+                    states[slot] = stored.packed(locations[slot]);
+                }
+            }
+        },
+        |_| {},
+    );
 }
 
 /// Sets the bits of slots, by tile.
@@ -413,7 +451,7 @@ mod tests {
         for _ in 0..rate_hz {
             solver.step();
         }
-        assert!(solver.particle_contacts.near.len() > 50, "hardly anything touches");
+        assert!(solver.particle_contacts.near.items.len() > 50, "hardly anything touches");
         assert_eq!(solver.particle_contacts.overflow_count, 0);
         solver.state_hash()
     }

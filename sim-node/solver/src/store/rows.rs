@@ -13,6 +13,7 @@ mod paths;
 
 pub(crate) use forces::RowForces;
 pub(crate) use layout::{LINE_LENGTH, RowLayout, STATE_FIELDS};
+pub(crate) use paths::ComparedRows;
 
 use crate::kernels::huge_pages::refill;
 use crate::kernels::lanes::axes;

@@ -1,6 +1,6 @@
 //! Follows all particles along their paths, and finds those that have left theirs.
 
-use super::paths::{GraphWork, NO_SLOT, Paths, Progress};
+use super::paths::{COMPARED_MIN, Compared, ComparedGraph, NO_SLOT, Paths, Progress, StrayMarks};
 use super::rows::Rows;
 use super::{Location, ParticleStore};
 use crate::kernels::lanes::PackedParticle;
@@ -49,24 +49,30 @@ impl ParticleStore {
         }
     }
 
-    /// Marks the particles that are not where their paths lead: entry i of `strays` has the bits of the slots 16 i to
-    /// 16 i + 15. NaN is beside no path. Returns true if one of them is too far from its path.
+    /// Marks the particles that are not where their paths lead. NaN is beside no path. Returns true if one of them is too
+    /// far from its path.
     pub(crate) fn mark_strays(
-        &self,
+        &mut self,
         paths: &Paths,
         progress: Progress,
-        strays: &mut [u16],
+        mut strays: StrayMarks<'_>,
     ) -> bool {
-        let kernels = self.kernels();
-        let (now, saved) = (self.graph.packed_particles(), paths.graph.as_slice());
-        let slots = paths.slots_of_graph.as_slice();
+        let Self { workers, graph, patches, crowds, .. } = self;
+        let (now, saved) = (graph.packed_particles(), paths.graph.as_slice());
+        let graph = ComparedGraph { now, saved, slots: &paths.slots_of_graph };
+        let length = workers.part_length(now.len(), COMPARED_MIN);
         let mut is_one_too_far =
-            kernels.run(GraphWork { now, saved, slots, progress, strays: &mut *strays });
+            strays.mark(workers, progress, graph.chunks(length).map(Compared::Graph));
         let saved = paths.in_rows.iter().zip(&paths.slots_in_rows);
-        for (rows, (saved, slots)) in self.all_rows().zip(saved) {
-            let work = rows.stray_work(saved, slots, progress, &mut *strays);
-            is_one_too_far |= kernels.run(work);
+        let rows = patches.iter().map(|patch| &patch.rows);
+        for (rows, (saved, slots)) in rows.chain(crowds.iter().map(|crowd| &crowd.rows)).zip(saved)
+        {
+            let rows_min = COMPARED_MIN.div_ceil(rows.layout.columns);
+            let row_count = workers.part_length(rows.layout.rows, rows_min);
+            let parts = rows.compared(saved, slots, row_count).map(Compared::Rows);
+            is_one_too_far |= strays.mark(workers, progress, parts);
         }
+        strays.merge();
         is_one_too_far
     }
 }

@@ -34,6 +34,12 @@ impl Workers {
         self.pool.worker_count()
     }
 
+    /// Number of items in each part if these many are divided among the workers. No part but the last one is shorter
+    /// than `min`, because a worker needs a microsecond to begin.
+    pub(crate) fn part_length(&self, count: usize, min: usize) -> usize {
+        count.div_ceil(self.count()).max(min)
+    }
+
     /// Makes room for contacts.
     pub(crate) fn reserve_contacts(&mut self, room: ContactRoom) {
         for scratch in &mut self.scratches {

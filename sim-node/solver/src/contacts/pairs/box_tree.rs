@@ -94,37 +94,6 @@ impl BoxTree {
         }
     }
 
-    /// Passes every pair of leaves of this tree that are near each other, at least one of them marked, to `accept`,
-    /// each once and with itself, the earlier leaf first. The order of two pairs is that of [`pair_order`].
-    pub(super) fn search(
-        &self,
-        distance: f32,
-        kernels: Kernels,
-        accept: &mut impl FnMut([u32; 2]) -> Search,
-    ) -> Search {
-        match self.root() {
-            Some(root) => kernels.run(PairSearch { tree: self, root, distance, accept }),
-            None => Search::Continue(()),
-        }
-    }
-
-    /// Passes every pair of a leaf of this tree and one of the other tree that are near each other, at least one of them
-    /// marked, to `accept`.
-    pub(super) fn search_between(
-        &self,
-        other: &Self,
-        (distance, kernels): (f32, Kernels),
-        accept: &mut impl FnMut([u32; 2]) -> Search,
-    ) -> Search {
-        match (self.root(), other.root()) {
-            (Some(a), Some(b)) => {
-                let trees = [self, other];
-                kernels.run(SearchBetween { trees, roots: [a, b], distance, accept })
-            }
-            _ => Search::Continue(()),
-        }
-    }
-
     fn root(&self) -> Option<Node> {
         let level = self.levels.len().checked_sub(1)?;
         Some(Node { level, index: 0 })
@@ -148,74 +117,122 @@ impl BoxTree {
     }
 }
 
-/// Pairs of nodes that are near each other. Later pairs lie deeper. A level has at most 16, or 4 in each of two trees.
-struct Stack {
-    pairs: [[Node; 2]; LEVELS_MAX * ARITY * ARITY],
-    length: usize,
+/// Two nodes.
+pub(super) type NodePair = [Node; 2];
+
+/// Where pairs of leaves are searched: the nodes below a pair of nodes.
+pub(super) trait Nesting: Copy + Sync {
+    /// The roots; none of empty trees.
+    fn root(self) -> Option<NodePair>;
+
+    /// Pushes the pairs of nodes below a pair that are near each other, one of them with a marked leaf. The first of them
+    /// comes last.
+    fn push_children<W: Wide>(self, pair: NodePair, distance: f32, stack: &mut Stack);
 }
 
-/// Finds the pairs of leaves of a tree that are near each other, depth first.
-struct PairSearch<'a, F> {
-    tree: &'a BoxTree,
-    root: Node,
+/// All pairs of leaves of a tree, each once and with itself, the earlier leaf first.
+#[derive(Clone, Copy)]
+pub(super) struct Within<'a>(pub(super) &'a BoxTree);
+
+/// All pairs of a leaf of one tree and a leaf of another one.
+#[derive(Clone, Copy)]
+pub(super) struct Between<'a>(pub(super) [&'a BoxTree; 2]);
+
+/// Pairs of nodes that together hold all pairs of leaves that a search finds, in the order of [`pair_order`].
+#[derive(Debug, Clone)]
+pub(super) struct Roots {
+    pub(super) pairs: Vec<NodePair>,
+    spare: Vec<NodePair>,
+}
+
+/// Number of pairs from which on [`Roots`] are not divided further.
+const ROOTS_WANTED: usize = 128;
+
+impl Default for Roots {
+    fn default() -> Self {
+        let room = || Vec::with_capacity(ARITY * ARITY * ROOTS_WANTED);
+        Self { pairs: room(), spare: room() }
+    }
+}
+
+impl Roots {
+    /// Replaces the pairs by those of a search, with a small part of it below each.
+    pub(super) fn find(&mut self, nesting: impl Nesting, distance: f32, kernels: Kernels) {
+        self.pairs.clear();
+        self.pairs.extend(nesting.root());
+        kernels.run(Division { nesting, distance, roots: self });
+    }
+}
+
+struct Division<'a, N> {
+    nesting: N,
     distance: f32,
-    accept: &'a mut F,
+    roots: &'a mut Roots,
 }
 
-/// Finds the pairs of leaves of two trees that are near each other, depth first.
-struct SearchBetween<'a, F> {
-    trees: [&'a BoxTree; 2],
-    roots: [Node; 2],
-    distance: f32,
-    accept: &'a mut F,
+impl<N: Nesting> LaneWork for Division<'_, N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<W: Wide>(self) {
+        let Self { nesting, distance, roots: Roots { pairs, spare } } = self;
+        let mut stack = Stack::default();
+        // All pairs lie at the same levels.
+        while pairs.len() < ROOTS_WANTED && pairs.first().is_some_and(|pair| !are_leaves(*pair)) {
+            spare.clear();
+            for pair in &*pairs {
+                nesting.push_children::<W>(*pair, distance, &mut stack);
+                spare.extend(std::iter::from_fn(|| stack.pop()));
+            }
+            std::mem::swap(pairs, spare);
+        }
+    }
 }
 
-impl<F: FnMut([u32; 2]) -> Search> LaneWork for SearchBetween<'_, F> {
+fn are_leaves([a, b]: NodePair) -> bool {
+    a.level == 0 && b.level == 0
+}
+
+/// Finds the pairs of leaves below some roots that are near each other, at least one of them marked, depth first. They
+/// ascend by [`pair_order`].
+pub(super) struct PairSearch<'a, N, F> {
+    pub(super) nesting: N,
+    pub(super) roots: &'a [NodePair],
+    pub(super) distance: f32,
+    pub(super) accept: &'a mut F,
+}
+
+impl<N: Nesting, F: FnMut([u32; 2]) -> Search> LaneWork for PairSearch<'_, N, F> {
     type Output = Search;
 
     #[inline(always)]
     fn run<W: Wide>(self) -> Search {
-        let Self { trees, roots, distance, accept } = self;
-        let mut stack = Stack { pairs: [roots; LEVELS_MAX * ARITY * ARITY], length: 1 };
-        while stack.length > 0 {
-            stack.length -= 1;
-            let pair = stack.pairs[stack.length];
-            if pair[0].level == 0 && pair[1].level == 0 {
-                accept(pair.map(Node::leaf))?;
-            } else {
-                let parent = usize::from(pair[0].level < pair[1].level);
-                stack.push_children_of::<W>(trees, pair, (parent, distance));
+        let Self { nesting, roots, distance, accept } = self;
+        let mut stack = Stack::default();
+        for root in roots {
+            stack.push(*root);
+            while let Some(pair) = stack.pop() {
+                if are_leaves(pair) {
+                    accept(pair.map(Node::leaf))?;
+                } else {
+                    nesting.push_children::<W>(pair, distance, &mut stack);
+                }
             }
         }
         Search::Continue(())
     }
 }
 
-impl<F: FnMut([u32; 2]) -> Search> LaneWork for PairSearch<'_, F> {
-    type Output = Search;
-
-    #[inline(always)]
-    fn run<W: Wide>(self) -> Search {
-        let Self { tree, root, distance, accept } = self;
-        let mut stack = Stack { pairs: [[root; 2]; LEVELS_MAX * ARITY * ARITY], length: 1 };
-        while stack.length > 0 {
-            stack.length -= 1;
-            let pair = stack.pairs[stack.length];
-            if pair[0].level == 0 {
-                accept(pair.map(Node::leaf))?;
-            } else {
-                stack.push_children::<W>(tree, pair, distance);
-            }
-        }
-        Search::Continue(())
+impl Nesting for Within<'_> {
+    fn root(self) -> Option<NodePair> {
+        self.0.root().map(|root| [root; 2])
     }
-}
 
-impl Stack {
-    /// Pushes the pairs of children of two nodes that are near each other. The comparison stands in the body of the loop:
-    /// in a closure of `filter`, it would be compiled for the baseline processor.
+    /// The comparison stands in the body of the loop: in a closure of `filter`, it would be compiled for the baseline
+    /// processor.
     #[inline(always)]
-    fn push_children<W: Wide>(&mut self, tree: &BoxTree, [a, b]: [Node; 2], distance: f32) {
+    fn push_children<W: Wide>(self, [a, b]: NodePair, distance: f32, stack: &mut Stack) {
+        let Self(tree) = self;
         let d = distance;
         let moved_out = W::load(&[0.0, 0.0, 0.0, 0.0, d, d, d, 0.0], 0);
         let rights = tree.children(b);
@@ -225,21 +242,24 @@ impl Stack {
             for right in rights.clone().rev().take_while(|right| left.index <= right.index) {
                 let sides = &tree.sides[right.level][right.index];
                 if (is_marked | tree.is_marked(right)) && sides.are_near(facing, moved_out) {
-                    self.pairs[self.length] = [left, right];
-                    self.length += 1;
+                    stack.push([left, right]);
                 }
             }
         }
     }
+}
 
-    /// Replaces one node of a pair, `parent`, by those of its children that are near the other one.
+impl Nesting for Between<'_> {
+    fn root(self) -> Option<NodePair> {
+        let [a, b] = self.0;
+        Some([a.root()?, b.root()?])
+    }
+
+    /// Only the node at the higher level is replaced by its children.
     #[inline(always)]
-    fn push_children_of<W: Wide>(
-        &mut self,
-        trees: [&BoxTree; 2],
-        pair: [Node; 2],
-        (parent, distance): (usize, f32),
-    ) {
+    fn push_children<W: Wide>(self, pair: NodePair, distance: f32, stack: &mut Stack) {
+        let Self(trees) = self;
+        let parent = usize::from(pair[0].level < pair[1].level);
         let d = distance;
         let moved_out = W::load(&[0.0, 0.0, 0.0, 0.0, d, d, d, 0.0], 0);
         let (tree, other_tree, other) = (trees[parent], trees[1 - parent], pair[1 - parent]);
@@ -250,14 +270,40 @@ impl Stack {
             if (is_marked | tree.is_marked(child)) && sides.are_near(facing, moved_out) {
                 let mut near = pair;
                 near[parent] = child;
-                self.pairs[self.length] = near;
-                self.length += 1;
+                stack.push(near);
             }
         }
     }
 }
 
-/// A number that ascends over the pairs of leaves of [`BoxTree::search`]: a pair is two paths from the root down, and
+/// Pairs of nodes that are near each other. Later pairs lie deeper. A level has at most 16, or 4 in each of two trees.
+pub(super) struct Stack {
+    pairs: [NodePair; LEVELS_MAX * ARITY * ARITY],
+    length: usize,
+}
+
+impl Default for Stack {
+    fn default() -> Self {
+        let none = Node { level: 0, index: 0 };
+        Self { pairs: [[none; 2]; LEVELS_MAX * ARITY * ARITY], length: 0 }
+    }
+}
+
+impl Stack {
+    #[inline(always)]
+    fn push(&mut self, pair: NodePair) {
+        self.pairs[self.length] = pair;
+        self.length += 1;
+    }
+
+    #[inline(always)]
+    fn pop(&mut self) -> Option<NodePair> {
+        self.length = self.length.checked_sub(1)?;
+        Some(self.pairs[self.length])
+    }
+}
+
+/// A number that ascends over the pairs of leaves of [`PairSearch`]: a pair is two paths from the root down, and
 /// at each node the first one counts more.
 #[inline(always)]
 pub(super) fn pair_order(leaves: [u32; 2]) -> u64 {
@@ -274,7 +320,7 @@ pub(super) fn pair_order(leaves: [u32; 2]) -> u64 {
 
 /// A box in a tree.
 #[derive(Debug, Clone, Copy)]
-struct Node {
+pub(super) struct Node {
     /// 0 for a leaf.
     level: usize,
     index: usize,
@@ -304,13 +350,18 @@ mod tests {
         tree
     }
 
-    fn found(tree: &BoxTree, kernels: Kernels) -> Vec<[u32; 2]> {
-        let mut pairs = Vec::new();
-        let search = tree.search(0.5, kernels, &mut |pair| {
-            pairs.push(pair);
-            Search::Continue(())
-        });
-        assert!(search.is_continue());
+    /// Searches below each of the roots alone.
+    fn found(nesting: impl Nesting, distance: f32, kernels: Kernels) -> Vec<[u32; 2]> {
+        let (mut roots, mut pairs) = (Roots::default(), Vec::new());
+        roots.find(nesting, distance, kernels);
+        for root in &roots.pairs {
+            let accept = &mut |pair| {
+                pairs.push(pair);
+                Search::Continue(())
+            };
+            let roots = std::slice::from_ref(root);
+            assert!(kernels.run(PairSearch { nesting, roots, distance, accept }).is_continue());
+        }
         pairs
     }
 
@@ -322,7 +373,7 @@ mod tests {
         let pairs = || (0..count).flat_map(|a| (a..count).map(move |b| [a, b]));
         for kernels in Kernels::available() {
             tree.mark((0..count).map(|_| true));
-            let all = found(&tree, kernels);
+            let all = found(Within(&tree), 0.5, kernels);
             assert!(all.is_sorted_by(|a, b| pair_order(*a) < pair_order(*b)), "{kernels:?}");
             let mut sorted = all.clone();
             sorted.sort_unstable();
@@ -332,7 +383,7 @@ mod tests {
             tree.mark(is_marked.iter().copied());
             let has_mark = |pair: &[u32; 2]| pair.iter().any(|leaf| is_marked[*leaf as usize]);
             let marked: Vec<_> = all.into_iter().filter(has_mark).collect();
-            assert_eq!(found(&tree, kernels), marked, "{kernels:?}");
+            assert_eq!(found(Within(&tree), 0.5, kernels), marked, "{kernels:?}");
         }
     }
 
@@ -352,12 +403,7 @@ mod tests {
                     });
                 left.mark(in_left.iter().copied());
                 right.mark(in_right.iter().copied());
-                let mut found = Vec::new();
-                let search = left.search_between(&right, (0.0, kernels), &mut |pair| {
-                    found.push(pair);
-                    Search::Continue(())
-                });
-                assert!(search.is_continue());
+                let mut found = found(Between([&left, &right]), 0.0, kernels);
                 found.sort_unstable();
                 let has_mark = |[a, b]: [u32; 2]| in_left[a as usize] || in_right[b as usize];
                 let pairs = (0..long).flat_map(|a| (0..short).map(move |b| [a, b]));

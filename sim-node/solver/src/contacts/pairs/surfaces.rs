@@ -25,6 +25,7 @@ use crate::kernels::Kernels;
 use crate::kernels::lanes::PackedParticle;
 use crate::scene::model::Model;
 use crate::state::tear::Torn;
+use crate::store::workers::Workers;
 use candidate::{Candidate, add_candidate, has_candidate};
 use contact::SurfaceContact;
 use nearby::NearbyWork;
@@ -191,12 +192,12 @@ impl SurfaceContacts {
         &mut self,
         states: &mut [PackedParticle],
         (thickness, reach): (f32, f32),
-        (friction, kernels): (f32, Kernels),
+        (friction, workers): (f32, &mut Workers),
     ) {
         let Self { surface, load_pairs, ordered, near, .. } = self;
         near.clear();
         let touching = Touching { surface, load_pairs, states, thickness, reach };
-        kernels.run(TouchWork { touching, candidates: ordered, near });
+        workers.kernels.run(TouchWork { touching, candidates: ordered, near });
         for contact in &*near {
             contact.push_apart(states, friction);
         }

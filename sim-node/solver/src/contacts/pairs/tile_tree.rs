@@ -3,16 +3,18 @@
 //! Sixteen particles that are neighbours at load form a tile. The tree above the tiles keeps its form from load
 //! to load: only the boxes follow the particles.
 
-use super::box_tree::{BoxTree, Search, pair_order};
+use super::box_tree::{BoxTree, NodePair, PairSearch, Roots, Search, Within, pair_order};
+use super::gathered::{Gathered, Room, parts};
 use super::tile::{TILE, TILE_LENGTH, Tile, coordinates, mark_all, members, take_lowest};
 use crate::contacts::bounds::Bounds;
 use crate::kernels::Kernels;
 use crate::kernels::lanes::{LaneWork, PackedParticle, Wide, axes};
 use crate::kernels::vectors::dot;
 use crate::scene::model::Model;
+use crate::store::workers::Workers;
 
 /// Number of pairs of tiles that are examined together.
-const TILE_PAIRS_MAX: usize = 4096;
+const TILE_PAIRS_MAX: usize = 512;
 
 /// The tiles and the boxes above them.
 #[derive(Debug, Clone, Default)]
@@ -27,8 +29,8 @@ pub(super) struct TileTree {
     /// By tile: a bit for each particle that has left its path since the last search. All have at first.
     pub(super) strays: Vec<u16>,
     particle_count: usize,
-    /// Pairs of tiles that are near each other, to be examined.
-    tile_pairs: Vec<[u32; 2]>,
+    /// Where the running search begins.
+    roots: Roots,
 }
 
 impl TileTree {
@@ -38,10 +40,17 @@ impl TileTree {
         let (starts, displacements) =
             (vec![Bounds::EMPTY; tiles.len()], vec![Bounds::EMPTY; tiles.len()]);
         let boxes = BoxTree::new(tiles.len());
-        let tile_pairs = Vec::with_capacity(TILE_PAIRS_MAX);
         let mut strays = vec![0; tiles.len()];
         mark_all(&mut strays, count);
-        Self { tiles, boxes, starts, displacements, strays, particle_count: count, tile_pairs }
+        Self {
+            tiles,
+            boxes,
+            starts,
+            displacements,
+            strays,
+            particle_count: count,
+            roots: Roots::default(),
+        }
     }
 
     /// Makes a tree of particles at rest where they are at load.
@@ -114,24 +123,53 @@ impl TileTree {
         except: &impl Fn([u32; 2]) -> [u16; TILE],
         accept: &mut impl FnMut([u32; 2]) -> Search,
     ) -> Search {
-        let mut pairs = std::mem::take(&mut self.tile_pairs);
+        self.roots.find(Within(&self.boxes), query.distance, kernels);
+        self.search_below(&self.roots.pairs, (query, kernels), except, accept)
+    }
+
+    /// Finds the pairs of [`Self::search`] with several workers. `accept` adds what it makes of a pair.
+    pub(super) fn gather<T: Copy + Send>(
+        &mut self,
+        (query, workers): (Query, &mut Workers),
+        except: &(impl Fn([u32; 2]) -> [u16; TILE] + Sync),
+        (found, accept): (
+            &mut Gathered<T>,
+            &(impl Fn([u32; 2], &mut Room<'_, T>) -> Search + Sync),
+        ),
+    ) -> Search {
+        let kernels = workers.kernels;
+        self.roots.find(Within(&self.boxes), query.distance, kernels);
         let tree = &*self;
-        let mut examine = |pairs: &mut Vec<[u32; 2]>| {
-            let search =
-                kernels.run(SearchWork { tree, pairs, query, except, accept: &mut *accept });
-            pairs.clear();
-            search
+        let roots = parts(&tree.roots.pairs, workers);
+        found.extend(workers, roots, |roots, room| {
+            tree.search_below(roots, (query, kernels), except, &mut |pair| accept(pair, room))
+        })
+    }
+
+    fn search_below(
+        &self,
+        roots: &[NodePair],
+        (query, kernels): (Query, Kernels),
+        except: &impl Fn([u32; 2]) -> [u16; TILE],
+        accept: &mut impl FnMut([u32; 2]) -> Search,
+    ) -> Search {
+        let mut tile_pairs = [[0; 2]; TILE_PAIRS_MAX];
+        let mut count = 0;
+        let mut examine = |pairs: &[[u32; 2]]| {
+            kernels.run(SearchWork { tree: self, pairs, query, except, accept: &mut *accept })
         };
-        let mut found = tree.boxes.search(query.distance, kernels, &mut |pair| {
-            pairs.push(pair);
-            if pairs.len() < TILE_PAIRS_MAX { Search::Continue(()) } else { examine(&mut pairs) }
-        });
-        if found.is_continue() {
-            found = examine(&mut pairs);
-        }
-        pairs.clear();
-        self.tile_pairs = pairs;
-        found
+        let (nesting, distance) = (Within(&self.boxes), query.distance);
+        let add = &mut |pair| {
+            tile_pairs[count] = pair;
+            count += 1;
+            if count < TILE_PAIRS_MAX {
+                return Search::Continue(());
+            }
+            count = 0;
+            examine(&tile_pairs)
+        };
+        kernels.run(PairSearch { nesting, roots, distance, accept: add })?;
+        examine(&tile_pairs[..count])
     }
 }
 

@@ -1,7 +1,7 @@
 //! The paths of the particles of rows.
 
-use super::Rows;
-use crate::kernels::lanes::{LaneWork, Wide, axes, lane_groups};
+use super::{RowLayout, Rows};
+use crate::kernels::lanes::{Wide, axes, lane_groups};
 use crate::store::paths::{NO_SLOT, Progress};
 
 /// Saved fields of a row: position and displacement.
@@ -41,36 +41,44 @@ impl Rows {
         slots[index / length * stride + index % length] = slot;
     }
 
-    /// Compares the particles with saved paths. Marks those that are beside theirs, and returns true if one is too far.
-    pub(crate) fn stray_work<'a>(
+    /// Divides the particles, with saved paths, into parts of this number of rows.
+    pub(crate) fn compared<'a>(
         &'a self,
         saved: &'a [f32],
         slots: &'a [u32],
-        progress: Progress,
-        strays: &'a mut [u16],
-    ) -> impl LaneWork<Output = bool> + 'a {
-        StrayWork { rows: self, saved, slots, progress, strays }
+        row_count: usize,
+    ) -> impl ExactSizeIterator<Item = ComparedRows<'a>> {
+        let RowLayout { length, stride, .. } = self.layout;
+        let numbers = self.numbers().chunks(row_count * length);
+        let paths =
+            saved.chunks(row_count * SAVED_FIELDS * stride).zip(slots.chunks(row_count * stride));
+        let layout = &self.layout;
+        numbers.zip(paths).map(move |(numbers, (saved, slots))| ComparedRows {
+            layout,
+            numbers,
+            saved,
+            slots,
+        })
     }
 }
 
-struct StrayWork<'a> {
-    rows: &'a Rows,
+/// Rows with the paths of their particles.
+#[derive(Clone, Copy)]
+pub(crate) struct ComparedRows<'a> {
+    layout: &'a RowLayout,
+    numbers: &'a [f32],
     saved: &'a [f32],
     slots: &'a [u32],
-    progress: Progress,
-    strays: &'a mut [u16],
 }
 
-impl LaneWork for StrayWork<'_> {
-    type Output = bool;
-
+impl ComparedRows<'_> {
+    /// Marks the particles that are beside their paths. Returns true if one is too far.
     #[inline(always)]
-    fn run<W: Wide>(self) -> bool {
+    pub(crate) fn mark_strays<W: Wide>(self, progress: Progress, strays: &mut [u16]) -> bool {
         let mut is_one_too_far = false;
-        let layout = &self.rows.layout;
-        let (stride, count) = (layout.stride, layout.columns.div_ceil(8));
-        let numbers: &[f32] = self.rows.numbers();
-        let rows = numbers.chunks_exact(layout.length);
+        let RowLayout { length, stride, columns, .. } = *self.layout;
+        let count = columns.div_ceil(8);
+        let rows = self.numbers.chunks_exact(length);
         let saved = self.saved.chunks_exact(SAVED_FIELDS * stride);
         for ((row, saved), slots) in rows.zip(saved).zip(self.slots.chunks_exact(stride)) {
             let x = axes(|axis| lane_groups(row, axis * stride, count));
@@ -87,8 +95,8 @@ impl LaneWork for StrayWork<'_> {
                     axes(|axis| W::load(&saved_x[axis][group], 0)),
                     axes(|axis| W::load(&saved_d[axis][group], 0)),
                 ];
-                let squares = self.progress.squares(now, saved);
-                is_one_too_far |= self.progress.mark_strays(squares, &slots[group], self.strays);
+                let squares = progress.squares(now, saved);
+                is_one_too_far |= progress.mark_strays(squares, &slots[group], strays);
             }
         }
         is_one_too_far

@@ -1,6 +1,6 @@
 //! Tiles of triangles, to find those that particles come near.
 
-use super::super::box_tree::{BoxTree, Search};
+use super::super::box_tree::{Between, BoxTree, PairSearch, Roots, Search};
 use super::super::load::LaneMasks;
 use super::super::tile::{
     TILE, TILE_LENGTH, coordinates, lanes_in_box, mark_all, members, take_lowest,
@@ -30,6 +30,8 @@ pub(super) struct TriangleTiles {
     placed: Vec<PlacedTile>,
     /// Tiles of particles and of triangles that are near each other, to be examined.
     tile_pairs: Vec<[u32; 2]>,
+    /// Where the running search begins.
+    roots: Roots,
 }
 
 impl TriangleTiles {
@@ -41,6 +43,7 @@ impl TriangleTiles {
             strays: vec![0; count],
             placed: vec![PlacedTile::default(); count],
             tile_pairs: Vec::with_capacity(TILE_PAIRS_MAX),
+            roots: Roots::default(),
         }
     }
 
@@ -77,7 +80,7 @@ impl TriangleTiles {
         at_load: &impl Fn([u32; 2]) -> AtLoad,
         accept: &mut impl FnMut([u32; 2]) -> Search,
     ) -> Search {
-        let Self { tiles, boxes, strays, placed, tile_pairs } = self;
+        let Self { tiles, boxes, strays, placed, tile_pairs, roots } = self;
         let strays = &*strays;
         placed.iter_mut().for_each(PlacedTile::clear);
         let mut examine = |pairs: &mut Vec<[u32; 2]>| {
@@ -97,12 +100,16 @@ impl TriangleTiles {
             pairs.clear();
             found
         };
-        let conditions = (search.distance, search.kernels);
-        let mut found = search.tree.boxes.search_between(boxes, conditions, &mut |pair| {
+        let (distance, kernels) = (search.distance, search.kernels);
+        let nesting = Between([&search.tree.boxes, boxes]);
+        roots.find(nesting, distance, kernels);
+        let add = &mut |pair| {
             tile_pairs.push(pair);
             let has_room = tile_pairs.len() < TILE_PAIRS_MAX;
             if has_room { Search::Continue(()) } else { examine(tile_pairs) }
-        });
+        };
+        let mut found =
+            kernels.run(PairSearch { nesting, roots: &roots.pairs, distance, accept: add });
         if found.is_continue() {
             found = examine(tile_pairs);
         }
