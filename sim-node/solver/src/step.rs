@@ -54,6 +54,14 @@ impl Solver {
             self.publish_put_in_place();
             return true;
         }
+        self.store.with_workers().0.begin_step();
+        let is_made = self.make_step(stop);
+        self.store.with_workers().0.end_step();
+        is_made
+    }
+
+    /// Returns `false` if the step was given up.
+    fn make_step(&mut self, stop: &AtomicBool) -> bool {
         self.begin_step();
         let mut is_marked = false;
         for substep in Substep::all(self.parameters.substeps) {

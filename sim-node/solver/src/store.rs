@@ -298,6 +298,12 @@ impl ParticleStore {
         self.workers.reserve_contacts(self.contact_room);
     }
 
+    /// Makes room for contacts of cloths as surfaces, if the scene has any.
+    pub(crate) fn reserve_surface_contacts(&mut self, has_surfaces: bool) {
+        self.contact_room.has_surfaces = has_surfaces;
+        self.workers.reserve_contacts(self.contact_room);
+    }
+
     pub(crate) fn thread_count(&self) -> usize {
         self.workers.count()
     }

@@ -11,6 +11,7 @@ mod box_tree;
 mod gathered;
 mod lane_bounds;
 mod load;
+mod loading;
 pub(crate) mod order;
 mod pair;
 mod push;
@@ -22,8 +23,10 @@ use box_tree::Search;
 use gathered::{Gathered, Room};
 pub(crate) use load::CONNECTED_REACH;
 use load::{LaneMasks, LoadPairs};
+use loading::load_states;
 use order::{order_by_key, order_key};
 use pair::Pair;
+pub(crate) use surfaces::NearTiles;
 use surfaces::{SurfaceContacts, SurfaceSearch};
 use tile::{TILE, TILE_LENGTH, members, take_lowest};
 use tile_tree::{Query, TileTree, search_order};
@@ -35,7 +38,7 @@ use crate::scene::model::Model;
 use crate::state::tear::Torn;
 use crate::step::substep::Substep;
 use crate::store::workers::Workers;
-use crate::store::{Location, ParticleStore, Paths, Progress, StoredParticles, StrayMarks};
+use crate::store::{Location, ParticleStore, Paths, Progress, StrayMarks};
 
 /// Pairs within this number of contact distances at the start of the stage take part in it, because
 /// another contact may push them together.
@@ -54,8 +57,6 @@ const STRAY_PART_MAX: f32 = 0.5;
 /// particles pile up in one point.
 const CANDIDATES_PER_PARTICLE: usize = 8;
 
-/// Fewest particles that a worker loads.
-const LOADED_MIN: usize = 512;
 /// Fewest candidates that a worker examines.
 const NEAR_MIN: usize = 256;
 
@@ -186,6 +187,7 @@ impl ParticleContacts {
         self.strays_of_others.resize_with(count - 1, || vec![0; tile_count]);
         self.candidates.set_worker_count(count);
         self.near.set_worker_count(count);
+        self.surfaces.set_worker_count(count);
     }
 
     /// Forgets the candidates of the step before, and takes torn triangles out.
@@ -207,12 +209,12 @@ impl ParticleContacts {
             // Candidates may come to other triangles.
             let has_candidates = self.surfaces.has_candidates();
             let wanted = if has_candidates { &self.members } else { &self.involved };
-            load(&mut self.states, wanted, (workers, stored, &self.locations));
+            load_states(&mut self.states, wanted, (workers, stored, &self.locations));
         }
         let Self { states, ordered, near, surfaces, thickness, .. } = self;
         near.items.clear();
         let part_length = workers.part_length(ordered.len(), NEAR_MIN);
-        let _has_room = near.extend(workers, (ordered, part_length), |pairs, near| {
+        let _has_room = near.extend(workers, (ordered, part_length), |pairs, near, _| {
             pairs
                 .iter()
                 .filter(|pair| pair.is_near(states, REACH))
@@ -290,7 +292,7 @@ impl ParticleContacts {
                 distance,
                 kernels,
             };
-            is_complete &= self.surfaces.find(&search).is_continue();
+            is_complete &= self.surfaces.find(&search, workers).is_continue();
         }
         self.is_complete = is_complete;
         self.overflow_count += u64::from(!is_complete);
@@ -303,7 +305,7 @@ impl ParticleContacts {
         self.paths_begin_at = Some(substep);
         store.save_paths(&mut self.paths);
         let (workers, stored) = store.with_workers();
-        load(&mut self.states, &self.members, (workers, stored, &self.locations));
+        load_states(&mut self.states, &self.members, (workers, stored, &self.locations));
         self.tree.begin_paths(&self.states, workers.kernels);
         if self.surfaces.are_on() {
             self.expected.copy_from_slice(&self.states);
@@ -383,29 +385,6 @@ impl ParticleContacts {
         self.involved.fill(0);
         mark(&mut self.involved, candidates.iter().flat_map(|pair| pair.slots));
     }
-}
-
-/// Loads the particles for which `wanted` has a bit, by tile.
-fn load(
-    states: &mut [PackedParticle],
-    wanted: &[u32],
-    (workers, stored, locations): (&mut Workers, StoredParticles<'_>, &[Location]),
-) {
-    let tile_count = workers.part_length(wanted.len(), LOADED_MIN / TILE);
-    let locations = locations.chunks(TILE * tile_count).zip(wanted.chunks(tile_count));
-    let parts = states.chunks_mut(TILE * tile_count).zip(locations);
-    workers.for_each(
-        parts,
-        |(states, (locations, wanted)), _| {
-            for (tile, mut lanes) in wanted.iter().copied().enumerate() {
-                while let Some(lane) = take_lowest(&mut lanes) {
-                    let slot = TILE * tile + lane as usize;
-                    states[slot] = stored.packed(locations[slot]);
-                }
-            }
-        },
-        |_| {},
-    );
 }
 
 /// Sets the bits of slots, by tile.

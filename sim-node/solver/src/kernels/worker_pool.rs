@@ -1,7 +1,7 @@
 //! Threads that work on one job at a time.
 //!
 //! A job within a step takes a few microseconds, so workers spin while they wait for one; between
-//! steps they park. A job is always divided in the same way and parts are never stolen, so the
+//! steps they park, and the next step wakes them before it needs them. A job is always divided in the same way and parts are never stolen, so the
 //! assignment of threads changes no bit.
 #![allow(unsafe_code, reason = "lends work to threads that outlive it; see `WorkerPool::run`")]
 
@@ -19,9 +19,8 @@ pub const THREADS_MAX: u8 = 64;
 /// Largest number of workers in a pool.
 pub(crate) const WORKERS_MAX: usize = THREADS_MAX as usize;
 
-/// Checks for a job before a worker yields or parks: 20 to 100 microseconds, depending on how long the processor pauses
-/// between two of them. To wake a parked worker takes as long, and most parts of a step that only one worker runs are
-/// shorter.
+/// Checks for a job before a worker yields or, between steps, parks: 20 to 100 microseconds, depending on how long the
+/// processor pauses between two of them. To wake a parked worker takes as long.
 const SPINS: u32 = 1 << 11;
 /// The same number if there are more workers than processors: another worker needs the processor.
 const SPINS_CROWDED: u32 = 1 << 6;
@@ -33,6 +32,8 @@ type Job<'a> = dyn Fn(usize) + Sync + 'a;
 pub(crate) struct WorkerPool {
     slot: Arc<JobSlot>,
     others: Vec<JoinHandle<()>>,
+    /// Number of jobs before the running step.
+    jobs_before: u64,
 }
 
 /// The current job, shared with all workers.
@@ -44,6 +45,8 @@ struct JobSlot {
     /// Workers that have not finished it.
     busy_count: AtomicUsize,
     has_panicked: AtomicBool,
+    /// A step runs that may have jobs, so workers do not park.
+    is_stepping: AtomicBool,
     is_shut_down: AtomicBool,
     /// By worker, without the first: it is parked, or about to park.
     is_parked: Vec<AtomicBool>,
@@ -70,6 +73,7 @@ impl WorkerPool {
             job: JobCell(UnsafeCell::new(None)),
             busy_count: AtomicUsize::new(0),
             has_panicked: AtomicBool::new(false),
+            is_stepping: AtomicBool::new(false),
             is_shut_down: AtomicBool::new(false),
             is_parked: (0..others).map(|_| AtomicBool::new(false)).collect(),
             spins: if is_crowded { SPINS_CROWDED } else { SPINS },
@@ -80,11 +84,35 @@ impl WorkerPool {
             thread.spawn(move || slot.serve(worker)).ok()
         };
         let others = (1..=others).map_while(start).collect();
-        Self { slot, others }
+        Self { slot, others, jobs_before: 0 }
     }
 
     pub(crate) fn worker_count(&self) -> usize {
         self.others.len() + 1
+    }
+
+    /// Wakes the workers, and lets them wait for jobs without parking, if the step before had any.
+    pub(crate) fn begin_step(&mut self) {
+        let job_count = self.slot.job_count.load(Ordering::Relaxed);
+        let had_jobs = std::mem::replace(&mut self.jobs_before, job_count) != job_count;
+        if had_jobs {
+            self.slot.is_stepping.store(true, Ordering::SeqCst);
+            self.wake();
+        }
+    }
+
+    /// Lets the workers park.
+    pub(crate) fn end_step(&mut self) {
+        self.slot.is_stepping.store(false, Ordering::Relaxed);
+    }
+
+    /// Wakes the workers that are parked.
+    fn wake(&self) {
+        for (is_parked, other) in self.slot.is_parked.iter().zip(&self.others) {
+            if is_parked.load(Ordering::SeqCst) {
+                other.thread().unpark();
+            }
+        }
     }
 
     /// Runs `work` on every part, part `i` on worker `i`, and returns when all parts are done.
@@ -118,11 +146,7 @@ impl WorkerPool {
         slot.busy_count.store(self.others.len(), Ordering::Relaxed);
         // Publishes the writes above. `is_parked` is read only after it; see `JobSlot::wait`.
         slot.job_count.fetch_add(1, Ordering::SeqCst);
-        for (is_parked, other) in slot.is_parked.iter().zip(&self.others) {
-            if is_parked.load(Ordering::SeqCst) {
-                other.thread().unpark();
-            }
-        }
+        self.wake();
         let result = catch_unwind(AssertUnwindSafe(|| job(0)));
         let mut spins = 0;
         while slot.busy_count.load(Ordering::Acquire) > 0 {
@@ -140,8 +164,12 @@ impl WorkerPool {
 impl JobSlot {
     /// Spins at first, then yields the core.
     fn back_off(&self, spins: &mut u32) {
-        *spins += 1;
-        if *spins < self.spins { spin_loop() } else { thread::yield_now() }
+        if *spins < self.spins {
+            *spins += 1;
+            spin_loop();
+        } else {
+            thread::yield_now();
+        }
     }
 
     /// Runs jobs until the pool shuts down.
@@ -168,20 +196,23 @@ impl JobSlot {
     /// Waits until more than `done_count` jobs were announced.
     fn wait(&self, worker: usize, done_count: u64) {
         let is_announced = || self.job_count.load(Ordering::SeqCst) != done_count;
-        for _ in 0..self.spins {
-            if is_announced() {
-                return;
-            }
-            spin_loop();
-        }
-        let is_parked = &self.is_parked[worker - 1];
-        is_parked.store(true, Ordering::SeqCst);
-        // This side sets `is_parked` and then reads `job_count`; `run` writes `job_count` and then
-        // reads `is_parked`. So at least one of the two sees the other.
+        let is_stepping = || self.is_stepping.load(Ordering::SeqCst);
+        let mut spins = 0;
         while !is_announced() {
-            thread::park();
+            if spins < self.spins || is_stepping() {
+                self.back_off(&mut spins);
+                continue;
+            }
+            let is_parked = &self.is_parked[worker - 1];
+            is_parked.store(true, Ordering::SeqCst);
+            // This side sets `is_parked` and then reads `job_count` and `is_stepping`; `run` and `begin_step` write one of
+            // these and then read `is_parked`. So at least one of the two sides sees the other.
+            while !is_announced() && !is_stepping() {
+                thread::park();
+            }
+            is_parked.store(false, Ordering::Relaxed);
+            spins = 0;
         }
-        is_parked.store(false, Ordering::Relaxed);
     }
 }
 

@@ -3,6 +3,7 @@
 use crate::constraints::bends::block::BendBlock;
 use crate::constraints::projection_block::ProjectionBlock;
 use crate::contacts::contact::{ContactRoom, Contacts};
+use crate::contacts::pairs::NearTiles;
 use crate::kernels::Kernels;
 use crate::kernels::worker_pool::{WORKERS_MAX, WorkerPool};
 
@@ -19,6 +20,7 @@ pub(crate) struct Workers {
 #[repr(align(128))]
 pub(crate) struct WorkerScratch {
     pub(crate) contacts: Contacts,
+    pub(crate) near_tiles: NearTiles,
     pub(crate) block: Box<ProjectionBlock>,
     pub(crate) bends: Box<BendBlock>,
 }
@@ -34,6 +36,16 @@ impl Workers {
         self.pool.worker_count()
     }
 
+    /// Prepares for the jobs of a step.
+    pub(crate) fn begin_step(&mut self) {
+        self.pool.begin_step();
+    }
+
+    /// Lets the threads rest until the next step.
+    pub(crate) fn end_step(&mut self) {
+        self.pool.end_step();
+    }
+
     /// Number of items in each part if these many are divided among the workers. No part but the last one is shorter
     /// than `min`, because a worker needs a microsecond to begin.
     pub(crate) fn part_length(&self, count: usize, min: usize) -> usize {
@@ -44,6 +56,15 @@ impl Workers {
     pub(crate) fn reserve_contacts(&mut self, room: ContactRoom) {
         for scratch in &mut self.scratches {
             scratch.contacts = Contacts::new(room);
+            scratch.near_tiles =
+                if room.has_surfaces { NearTiles::new() } else { NearTiles::default() };
+        }
+    }
+
+    /// Forgets the tiles that searches have come to.
+    pub(crate) fn clear_near_tiles(&mut self) {
+        for scratch in &mut self.scratches {
+            scratch.near_tiles.clear();
         }
     }
 

@@ -336,6 +336,23 @@ fn threads_give_the_same_bits_on_every_built_in_scene() {
     }
 }
 
+/// A cloth that folds on a ball, and a rope that falls on it.
+#[test]
+fn threads_give_the_same_bits_where_cloths_touch() {
+    for mode in ["particles", "surfaces"] {
+        let text = format!(
+            "version = 1\n[solver]\nrate_hz = 60\nsubsteps = 16\n[contact]\nmode = \"{mode}\"\n\
+             thickness = 0.02\n[[generate]]\nshape = \"cloth\"\ncolumns = 50\nrows = 50\n\
+             spacing = 0.02\npinned = \"none\"\nmass = 0.001\norigin = [-0.5, 0.22, -0.5]\n\
+             right = [1, 0, 0]\ndown = [0, 0, 1]\n[[generate]]\nshape = \"rope\"\ncount = 40\n\
+             from = [-0.4, 0.3, 0.1]\nto = [0.4, 0.32, 0]\nmass = 0.001\npinned = \"none\"\n\
+             [[collider]]\nshape = \"sphere\"\ncenter = [0, 0.1, 0]\nradius = 0.1\n\
+             [[collider]]\nshape = \"plane\"\nnormal = [0, 1, 0]\noffset = 0\nfriction = 0.3\n"
+        );
+        assert_same_bits_of_threads(&text, mode, 60);
+    }
+}
+
 #[test]
 fn threads_give_the_same_bits_on_large_sheets() {
     for (name, solver, generator) in VARIANTS {

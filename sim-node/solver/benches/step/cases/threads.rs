@@ -1,4 +1,4 @@
-//! Gain by a second thread, in wall-clock time.
+//! Gain by a second thread, in wall-clock time, without contacts and with them.
 
 use serde::Serialize;
 use sim_solver::{Scene, Solver};
@@ -10,6 +10,10 @@ use crate::scenes::sheet::Sheet;
 
 /// Side of the sheet, substeps, and turns.
 const SHEETS: [(u32, u32, usize); 4] = [(32, 16, 60), (100, 16, 30), (316, 8, 8), (1000, 4, 2)];
+/// Sides of the sheets that touch themselves, and turns.
+const TOUCHING: [(u32, usize); 2] = [(100, 12), (316, 3)];
+/// Modes of contact.
+const MODES: [&str; 2] = ["particles", "surfaces"];
 /// Consecutive steps of one solver. A thread that still waits for work disturbs only the first step
 /// of the other solver.
 const STEPS_PER_TURN: usize = 5;
@@ -56,6 +60,34 @@ pub(crate) fn run(options: &Options, report: &mut Report) {
             report.push(&measure(case, &scene, options.count(turns)));
         }
     }
+    for (columns, turns) in TOUCHING {
+        for mode in MODES {
+            let case = format!("threads-{columns}-{mode}");
+            if options.wants(&case) {
+                let scene = falling(columns, mode);
+                report.push(&measure(case, &scene, options.count(turns)));
+            }
+        }
+    }
+}
+
+/// A sheet that falls on a ball and folds, 60 x 16 substeps a second.
+fn falling(columns: u32, mode: &str) -> Scene {
+    let spacing = 0.02;
+    let half = spacing * f64::from(columns - 1) / 2.0;
+    let radius = half / 4.0;
+    let text = format!(
+        "version = 1\n[solver]\nrate_hz = 60\nsubsteps = 16\n[contact]\nmode = \"{mode}\"\n\
+         [[generate]]\nshape = \"mesh\"\ncolumns = {columns}\nrows = {columns}\nspacing = {spacing}\n\
+         mass = 0.001\ncompliance = {{ bend = 1e-3 }}\norigin = [{}, {}, {}]\nright = [1, 0, 0]\n\
+         down = [0, 0, 1]\n[[collider]]\nshape = \"sphere\"\ncenter = [0, {radius}, 0]\n\
+         radius = {radius}\nfriction = 0.3\n\
+         [[collider]]\nshape = \"plane\"\nnormal = [0, 1, 0]\noffset = 0\nfriction = 0.3\n",
+        -half,
+        2.1 * radius,
+        -half
+    );
+    Scene::from_toml(&text, "threads").unwrap()
 }
 
 /// Measures in turns, so that disturbances affect both alike.

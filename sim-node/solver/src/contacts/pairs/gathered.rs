@@ -1,7 +1,7 @@
 //! Lists that several workers fill.
 
 use super::box_tree::Search;
-use crate::store::workers::Workers;
+use crate::store::workers::{WorkerScratch, Workers};
 
 /// Number of parts for each worker where some parts take longer than others.
 const PARTS_PER_WORKER: usize = 8;
@@ -78,29 +78,60 @@ impl<T: Copy + Send> Gathered<T> {
         &mut self,
         workers: &mut Workers,
         (all, part_length): (&[P], usize),
-        find: impl Fn(&[P], &mut Room<'_, T>) -> Search + Sync,
+        find: impl Fn(&[P], &mut Room<'_, T>, &mut WorkerScratch) -> Search + Sync,
     ) -> Search {
         let Self { items, count_max, shares } = self;
         let part_count = all.len().div_ceil(part_length);
-        let worker_count = shares.len().min(part_count);
+        let worker_count = shares.len().min(workers.count()).min(part_count);
         if worker_count <= 1 {
-            return find(all, &mut Room { items, count_max: *count_max });
+            return find(all, &mut Room { items, count_max: *count_max }, workers.own_scratch());
         }
         assert!(part_count <= PARTS_PER_WORKER * worker_count, "too many parts");
         // One item more than fits tells that there are too many.
         let room = *count_max - items.len() + 1;
         workers.for_each(
             shares[..worker_count].iter_mut().enumerate(),
-            |(worker, share), _| {
+            |(worker, share), scratch| {
+                share.clear();
                 // Neighbouring parts, which often take equally long, go to different workers.
-                share.find_in(
-                    all.chunks(part_length).skip(*worker).step_by(worker_count),
-                    room,
-                    &find,
-                );
+                for part in all.chunks(part_length).skip(*worker).step_by(worker_count) {
+                    // Without room, the parts behind this one find nothing, and are not needed.
+                    share.add(room, |room| find(part, room, scratch));
+                }
             },
             |_| {},
         );
+        self.join(part_count, worker_count)
+    }
+
+    /// The same for items that the workers change. Each has one part, of at least `length_min` items.
+    pub(super) fn extend_from<P: Send>(
+        &mut self,
+        workers: &mut Workers,
+        (all, length_min): (&mut [P], usize),
+        find: impl Fn(&mut [P], &mut Room<'_, T>) -> Search + Sync,
+    ) -> Search {
+        let Self { items, count_max, shares } = self;
+        let part_length = workers.part_length(all.len(), length_min);
+        let part_count = all.len().div_ceil(part_length);
+        if part_count.min(shares.len()) <= 1 {
+            return find(all, &mut Room { items, count_max: *count_max });
+        }
+        let room = *count_max - items.len() + 1;
+        workers.for_each(
+            shares.iter_mut().zip(all.chunks_mut(part_length)),
+            |(share, part), _| {
+                share.clear();
+                share.add(room, |room| find(part, room));
+            },
+            |_| {},
+        );
+        self.join(part_count, part_count)
+    }
+
+    /// Appends what the workers have found, part by part.
+    fn join(&mut self, part_count: usize, worker_count: usize) -> Search {
+        let Self { items, count_max, shares } = self;
         for part in 0..part_count {
             let found = shares[part % worker_count].of_part(part / worker_count);
             let fitting = found.len().min(*count_max - items.len());
@@ -113,24 +144,77 @@ impl<T: Copy + Send> Gathered<T> {
     }
 }
 
-impl<T: Copy> Share<T> {
-    fn find_in<'a, P: 'a>(
-        &mut self,
-        parts: impl Iterator<Item = &'a [P]>,
-        room: usize,
-        find: &impl Fn(&[P], &mut Room<'_, T>) -> Search,
-    ) {
+impl<T> Share<T> {
+    fn clear(&mut self) {
         self.items.clear();
         self.ends.clear();
-        for part in parts {
-            // Without room, the parts behind this one find nothing, and are not needed.
-            let _end = find(part, &mut Room { items: &mut self.items, count_max: room });
-            self.ends.push(self.items.len());
-        }
     }
 
+    /// Adds what is found in a part.
+    fn add(&mut self, count_max: usize, find: impl FnOnce(&mut Room<'_, T>) -> Search) {
+        let _end = find(&mut Room { items: &mut self.items, count_max });
+        self.ends.push(self.items.len());
+    }
     fn of_part(&self, part: usize) -> &[T] {
         let start = part.checked_sub(1).map_or(0, |before| self.ends[before]);
         &self.items[start..self.ends[part]]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kernels::Kernels;
+
+    /// Adds the numbers that divide by 3, as long as there is room.
+    fn gather(count_max: usize, worker_count: usize) -> (Vec<u32>, bool) {
+        let all: Vec<u32> = (0..1000).collect();
+        let mut workers = Workers::new(Kernels::Reference, worker_count);
+        let mut found = Gathered::new(count_max);
+        found.set_worker_count(worker_count);
+        found.items.push(7);
+        let parts = parts(&all, &workers);
+        let end = found.extend(&mut workers, parts, |part, found, _| {
+            part.iter().filter(|one| *one % 3 == 0).try_for_each(|one| found.add(*one))
+        });
+        (found.items, end.is_break())
+    }
+
+    #[test]
+    fn workers_find_what_one_worker_finds_in_the_same_order() {
+        // There are 334 of them.
+        for count_max in [1, 2, 100, 334, 335, 336, 1000] {
+            let expected = gather(count_max, 1);
+            assert_eq!(expected.1, count_max < 335, "{count_max}");
+            for worker_count in [2, 3, 8] {
+                assert_eq!(
+                    gather(count_max, worker_count),
+                    expected,
+                    "{count_max}, {worker_count}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn workers_change_their_parts_and_add_in_order() {
+        for worker_count in [1, 2, 3, 8] {
+            let mut all: Vec<u32> = (0..100).collect();
+            let mut workers = Workers::new(Kernels::Reference, worker_count);
+            let mut found = Gathered::new(60);
+            found.set_worker_count(worker_count);
+            let work = |one: &mut u32, found: &mut Room<'_, u32>| {
+                *one += 1;
+                if one.is_multiple_of(2) { found.add(*one) } else { Search::Continue(()) }
+            };
+            let end = found.extend_from(&mut workers, (&mut all, 4), |part, found| {
+                part.iter_mut().try_for_each(|one| work(one, found))
+            });
+            assert!(end.is_continue() && all.iter().copied().eq(1..=100), "{worker_count}");
+            assert!(
+                found.items.iter().copied().eq((1..=50).map(|half| 2 * half)),
+                "{worker_count}"
+            );
+        }
     }
 }

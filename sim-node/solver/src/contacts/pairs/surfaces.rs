@@ -7,6 +7,7 @@
 mod candidate;
 mod contact;
 mod faces;
+mod finding;
 mod nearby;
 mod nearest;
 mod placed_tile;
@@ -18,8 +19,9 @@ mod triangle_tile;
 mod triangle_tiles;
 
 use super::box_tree::Search;
+use super::gathered::Gathered;
 use super::load::{self, LoadPairs, PairMasks};
-use super::order::{order_by_key, order_key};
+use super::order::order_by_key;
 use super::tile_tree::TileTree;
 use crate::kernels::Kernels;
 use crate::kernels::lanes::PackedParticle;
@@ -28,8 +30,10 @@ use crate::state::tear::Torn;
 use crate::store::workers::Workers;
 use candidate::{Candidate, add_candidate, has_candidate};
 use contact::SurfaceContact;
-use nearby::NearbyWork;
+use finding::{Adding, Finding};
+use nearby::NearPoint;
 use nearest::{Feature, Nearest};
+pub(crate) use placed_tile::NearTiles;
 use surface::{Found, Surface, View};
 use touching::{TouchWork, Touching};
 pub(super) use triangle_tiles::SurfaceSearch;
@@ -38,8 +42,11 @@ use triangle_tiles::{AtLoad, TriangleTiles, Wanted};
 /// Largest number of triangles that a particle never touches, on average. Further ones touch it as all others.
 const NEVER_PER_PARTICLE: usize = 128;
 
-/// Number of particles and triangles in reach that are examined together.
-const IN_REACH_MAX: usize = 1024;
+/// Nearest points for each candidate for which several workers have room: triangles at an edge or a corner share theirs.
+/// With more, one worker searches.
+const POINTS_PER_CANDIDATE: usize = 2;
+/// Fewest candidates that a worker examines.
+const TOUCH_MIN: usize = 128;
 
 /// Finds and resolves the contacts of particles with triangles. Empty in other modes.
 #[derive(Debug, Clone, Default)]
@@ -50,17 +57,18 @@ pub(super) struct SurfaceContacts {
     load_pairs: LoadPairs,
     /// Slots and the triangles at an edge of one that they never touch.
     rims: PairMasks,
-    /// Particles and triangles that may be near, and the parts of the triangles that are.
-    in_reach: Vec<[u32; 2]>,
-    features: Vec<Option<Feature>>,
     candidate_count_max: usize,
     candidates: Vec<Candidate>,
     /// By slot: the candidate that was found last.
     newest: Vec<Option<u32>>,
     /// The candidates in the order of contact.
     ordered: Vec<Candidate>,
+    /// The candidates whose particle is on its path, and the nearest part of their triangle.
+    kept: Gathered<(Candidate, Feature)>,
+    /// What several workers find.
+    points: Gathered<NearPoint>,
     /// The contacts of the running substep, in the order of contact.
-    near: Vec<SurfaceContact>,
+    near: Gathered<SurfaceContact>,
     /// Number of torn constraints and their hash, for which the torn triangles were looked up.
     torn: (usize, u64),
 }
@@ -94,15 +102,26 @@ impl SurfaceContacts {
             tiles,
             load_pairs,
             rims,
-            in_reach: Vec::with_capacity(IN_REACH_MAX),
-            features: Vec::with_capacity(IN_REACH_MAX),
             candidate_count_max,
             newest: vec![None; particles.len()],
             candidates: Vec::with_capacity(candidate_count_max),
             ordered: Vec::with_capacity(candidate_count_max),
-            near: Vec::with_capacity(candidate_count_max),
+            kept: Gathered::new(candidate_count_max),
+            points: Gathered::default(),
+            near: Gathered::new(candidate_count_max),
             torn: (0, 0),
         }
+    }
+
+    /// Makes room for what each of these workers finds.
+    pub(super) fn set_worker_count(&mut self, count: usize) {
+        // One worker adds each point as soon as it is found.
+        let point_count =
+            if count > 1 { POINTS_PER_CANDIDATE * self.candidate_count_max } else { 0 };
+        self.points = Gathered::new(point_count);
+        self.points.set_worker_count(count);
+        self.kept.set_worker_count(count);
+        self.near.set_worker_count(count);
     }
 
     pub(super) fn are_on(&self) -> bool {
@@ -125,38 +144,24 @@ impl SurfaceContacts {
 
     /// Slots of the particles that the running substep may have pushed.
     pub(super) fn touched(&self) -> impl Iterator<Item = u32> + '_ {
-        self.near.iter().flat_map(|contact| contact.slots)
+        self.near.items.iter().flat_map(|contact| contact.slots)
     }
 
     /// Finds the candidates of strays, and orders all. Breaks if there are too many.
-    pub(super) fn find(&mut self, search: &SurfaceSearch<'_>) -> Search {
-        self.tiles.refit(&self.surface, search);
-        self.keep_candidates(search);
-        let Self {
-            surface, tiles, load_pairs, rims, in_reach, features, candidates, newest, ..
-        } = self;
-        let (surface, load_pairs) = (&*surface, &*load_pairs);
-        let mut adding = Adding {
-            surface,
-            load_pairs,
-            search,
-            features,
-            candidates,
-            newest,
-            count_max: self.candidate_count_max,
+    pub(super) fn find(&mut self, search: &SurfaceSearch<'_>, workers: &mut Workers) -> Search {
+        self.tiles.prepare(&self.surface, search, workers);
+        workers.clear_near_tiles();
+        self.keep_candidates(search, workers);
+        let Self { surface, tiles, load_pairs, rims, candidates, newest, points, .. } = self;
+        let finding = Finding { surface, tiles, load_pairs, rims, search };
+        let count_max = self.candidate_count_max;
+        let mut adding = Adding { surface, load_pairs, search, candidates, newest, count_max };
+        let found = if workers.count() > 1 && finding.gather(points, workers).is_continue() {
+            points.items.iter().try_for_each(|point| adding.add(*point))
+        } else {
+            let near_tiles = &mut workers.own_scratch().near_tiles;
+            finding.find(&tiles.roots.pairs, near_tiles, &mut |point| adding.add(point))
         };
-        let at_load =
-            |tiles| AtLoad { never: load_pairs.untouchable(tiles), rim: rims.of_tiles(tiles) };
-        let wanted = Wanted::Nearest;
-        let mut found = tiles.search((surface, wanted), search, &at_load, &mut |pair| {
-            in_reach.push(pair);
-            let has_room = in_reach.len() < IN_REACH_MAX;
-            if has_room { Search::Continue(()) } else { adding.add(in_reach) }
-        });
-        if found.is_continue() {
-            found = adding.add(in_reach);
-        }
-        in_reach.clear();
         order_by_key(&self.candidates, &mut self.ordered, |candidate| candidate.key);
         found
     }
@@ -166,23 +171,28 @@ impl SurfaceContacts {
     /// The triangle is the one on the paths, as in the search: where the particle is now, it may be another one, which the
     /// search would not recognize. It is kept even if it has a stray: its point may be a corner that the search finds only
     /// at another triangle, one without strays.
-    fn keep_candidates(&mut self, search: &SurfaceSearch<'_>) {
-        let Self { surface, load_pairs, candidates, newest, ordered, .. } = self;
+    fn keep_candidates(&mut self, search: &SurfaceSearch<'_>, workers: &mut Workers) {
+        let Self { surface, load_pairs, candidates, newest, ordered, kept, .. } = self;
+        let (surface, load_pairs) = (&*surface, &*load_pairs);
+        kept.items.clear();
+        let part_length = workers.part_length(ordered.len(), TOUCH_MIN);
+        let _has_room = kept.extend(workers, (ordered, part_length), |ordered, kept, _| {
+            let mut on_paths = ordered.iter().filter(|one| !search.tree.is_stray(one.slot));
+            on_paths.try_for_each(|candidate| {
+                let view = View { particles: search.states, slot: candidate.slot, time: 0.0 };
+                let Found { triangle, nearest, .. } =
+                    surface.descend(candidate.triangle, (view, load_pairs));
+                kept.add((Candidate { triangle, ..*candidate }, nearest.feature))
+            })
+        });
         candidates.clear();
         newest.fill(None);
-        for candidate in ordered.iter() {
-            let slot = candidate.slot;
-            if search.tree.is_stray(slot) {
-                continue;
-            }
-            let view = View { particles: search.states, slot, time: 0.0 };
-            let Found { triangle, nearest, .. } =
-                surface.descend(candidate.triangle, (view, load_pairs));
-            let is_known = has_candidate(candidates, newest[slot as usize], |known| {
-                surface.shares(triangle, nearest.feature, known)
+        for (candidate, feature) in &kept.items {
+            let is_known = has_candidate(candidates, newest[candidate.slot as usize], |known| {
+                surface.shares(candidate.triangle, *feature, known)
             });
             if !is_known {
-                add_candidate(candidates, newest, Candidate { triangle, ..*candidate });
+                add_candidate(candidates, newest, *candidate);
             }
         }
     }
@@ -195,53 +205,15 @@ impl SurfaceContacts {
         (friction, workers): (f32, &mut Workers),
     ) {
         let Self { surface, load_pairs, ordered, near, .. } = self;
-        near.clear();
+        near.items.clear();
         let touching = Touching { surface, load_pairs, states, thickness, reach };
-        workers.kernels.run(TouchWork { touching, candidates: ordered, near });
-        for contact in &*near {
+        let kernels = workers.kernels;
+        let _has_room = near.extend_from(workers, (ordered, TOUCH_MIN), |candidates, near| {
+            kernels.run(TouchWork { touching, candidates, near })
+        });
+        for contact in &near.items {
             contact.push_apart(states, friction);
         }
-    }
-}
-
-/// Adds the candidates among particles and triangles in reach.
-struct Adding<'a> {
-    surface: &'a Surface,
-    load_pairs: &'a LoadPairs,
-    search: &'a SurfaceSearch<'a>,
-    features: &'a mut Vec<Option<Feature>>,
-    candidates: &'a mut Vec<Candidate>,
-    newest: &'a mut [Option<u32>],
-    count_max: usize,
-}
-
-impl Adding<'_> {
-    /// Adds those of the pairs that come near each other, and empties the list. Breaks if there are too many candidates.
-    fn add(&mut self, pairs: &mut Vec<[u32; 2]>) -> Search {
-        let Self { surface, load_pairs, search, features, candidates, newest, count_max } = self;
-        search.kernels.run(NearbyWork { surface, load_pairs, search, pairs, features });
-        for ([slot, triangle], feature) in pairs.drain(..).zip(features.iter()) {
-            let Some(feature) = *feature else { continue };
-            // Triangles that share the nearest point are one candidate.
-            let is_known = has_candidate(candidates, newest[slot as usize], |known| {
-                surface.shares(triangle, feature, known)
-            });
-            if is_known {
-                continue;
-            }
-            if candidates.len() == *count_max {
-                return Search::Break(());
-            }
-            let triangle = surface.first_sharing(triangle, feature, |one| {
-                !surface.has_corner(one, slot) && !load_pairs.never_touch(slot, one)
-            });
-            let first = surface.corners[triangle as usize][0];
-            let [a, b] = [slot, first].map(|slot| search.particles[slot as usize]);
-            let key = order_key(a, b);
-            let candidate = Candidate { slot, triangle, previous: None, key };
-            add_candidate(candidates, newest, candidate);
-        }
-        Search::Continue(())
     }
 }
 
@@ -262,21 +234,23 @@ fn near_at_load(
     let body = |slot: u32| bodies[particles[slot as usize] as usize];
     let count_max = NEVER_PER_PARTICLE * particles.len();
     let (mut never, mut closer) = (Vec::new(), Vec::new());
-    tiles.refit(surface, search);
-    let _is_complete =
-        tiles.search((surface, Wanted::All), search, &|_| AtLoad::default(), &mut |pair| {
-            let [slot, triangle] = pair;
-            let corners = surface.place(triangle, View { particles: states, slot, time: 0.0 });
-            let apart = Nearest::new(corners).mean(corners).length();
-            let is_of_body = body(slot) == body(surface.corners[triangle as usize][0]);
-            if (is_of_body && apart < distance) || apart == 0.0 {
-                never.push(pair);
-            } else if apart < thickness {
-                closer.push((pair, apart));
-            }
-            let is_full = never.len() + closer.len() >= count_max;
-            if is_full { Search::Break(()) } else { Search::Continue(()) }
-        });
+    tiles.prepare(surface, search, &mut Workers::new(search.kernels, 1));
+    let (roots, mut near_tiles) = (&tiles.roots.pairs, NearTiles::new());
+    let start = (roots.as_slice(), &mut near_tiles);
+    let all = (surface, search, Wanted::All);
+    let _is_complete = tiles.search(start, all, &|_| AtLoad::default(), &mut |pair| {
+        let [slot, triangle] = pair;
+        let corners = surface.place(triangle, View { particles: states, slot, time: 0.0 });
+        let apart = Nearest::new(corners).mean(corners).length();
+        let is_of_body = body(slot) == body(surface.corners[triangle as usize][0]);
+        if (is_of_body && apart < distance) || apart == 0.0 {
+            never.push(pair);
+        } else if apart < thickness {
+            closer.push((pair, apart));
+        }
+        let is_full = never.len() + closer.len() >= count_max;
+        if is_full { Search::Break(()) } else { Search::Continue(()) }
+    });
     LoadPairs::from_pairs(never, closer, particles.len())
 }
 
@@ -297,12 +271,19 @@ mod tests {
     use super::super::tile::TILE;
     use super::samples::{Random, sheet};
     use super::*;
+    use crate::contacts::contact::ContactRoom;
 
     const SIDE: u32 = 24;
     const SPACING: f32 = 0.02;
     /// Substeps of the paths, and those that have passed when some particles leave theirs.
     const SPAN: f32 = 8.0;
     const PASSED: f32 = 3.0;
+
+    fn workers() -> Workers {
+        let mut workers = Workers::new(Kernels::Reference, 1);
+        workers.reserve_contacts(ContactRoom { has_surfaces: true, ..ContactRoom::default() });
+        workers
+    }
 
     /// A particle at rest in a rolled sheet whose layers are 25 mm apart, in disorder.
     fn rolled(particle: u32, random: &mut Random) -> PackedParticle {
@@ -356,6 +337,7 @@ mod tests {
         let model = sheet(SIDE, SPACING);
         let particles = load::slots(&model);
         let kernels = Kernels::Reference;
+        let mut workers = workers();
         let (mut found_count, mut on_rim_count, mut missed) = (0, 0, 0);
         for seed in 0..4 {
             let mut random = Random(seed);
@@ -366,7 +348,7 @@ mod tests {
             let room = 8 * particles.len();
             let mut contacts = SurfaceContacts::new(&model, &particles, (SPACING, kernels), room);
             let all = search(&tree, (&states, &particles), (true, 0.0, SPAN));
-            assert!(contacts.find(&all).is_continue());
+            assert!(contacts.find(&all, &mut workers).is_continue());
             for (slot, triangle, feature) in minima(&contacts, &states) {
                 let newest = contacts.newest[slot as usize];
                 let is_known = has_candidate(&contacts.candidates, newest, |known| {
@@ -390,6 +372,7 @@ mod tests {
         let new =
             || SurfaceContacts::new(&model, &particles, (SPACING, kernels), 8 * particles.len());
         let (mut found_count, mut missed) = (0, 0);
+        let mut workers = workers();
         for seed in 0..100 {
             let mut random = Random(seed);
             let mut states: Vec<_> =
@@ -399,7 +382,7 @@ mod tests {
             tree.refit([0.0, SPAN], kernels);
             let mut contacts = new();
             let all = search(&tree, (&states, &particles), (true, 0.0, SPAN));
-            assert!(contacts.find(&all).is_continue());
+            assert!(contacts.find(&all, &mut workers).is_continue());
 
             tree.place(PASSED, kernels, &mut states);
             tree.strays.fill(0);
@@ -417,14 +400,14 @@ mod tests {
             tree.refit([PASSED, SPAN], kernels);
             let rest = SPAN - PASSED;
             let some = search(&tree, (&states, &particles), (false, PASSED, rest));
-            assert!(contacts.find(&some).is_continue());
+            assert!(contacts.find(&some, &mut workers).is_continue());
 
             let mut fresh_tree = TileTree::new(particles.len());
             fresh_tree.begin_paths(&states, kernels);
             fresh_tree.refit([0.0, rest], kernels);
             let mut fresh = new();
             let all = search(&fresh_tree, (&states, &particles), (true, 0.0, rest));
-            assert!(fresh.find(&all).is_continue());
+            assert!(fresh.find(&all, &mut workers).is_continue());
 
             for Candidate { slot, triangle, .. } in &fresh.candidates {
                 let view = View { particles: &states, slot: *slot, time: 0.0 };

@@ -141,7 +141,7 @@ impl TileTree {
         self.roots.find(Within(&self.boxes), query.distance, kernels);
         let tree = &*self;
         let roots = parts(&tree.roots.pairs, workers);
-        found.extend(workers, roots, |roots, room| {
+        found.extend(workers, roots, |roots, room, _| {
             tree.search_below(roots, (query, kernels), except, &mut |pair| accept(pair, room))
         })
     }

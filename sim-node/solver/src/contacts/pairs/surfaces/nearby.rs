@@ -1,6 +1,8 @@
 //! Tells which triangles in reach have a point that is nearest to a particle and comes near it.
 
+use super::super::box_tree::Search;
 use super::super::load::LoadPairs;
+use super::super::tile::take_lowest;
 use super::faces::{Corners, mean, nearest_on_faces};
 use super::nearest::{Feature, Nearest, clamped, next};
 use super::surface::{Surface, View};
@@ -11,37 +13,55 @@ use crate::kernels::vectors::{difference, dot, scaled, sum};
 /// Share of a distance that exceeds its rounding.
 const ROUNDING: f32 = 1e-4;
 
-/// Finds, for each particle and triangle in `pairs`, the part of the triangle with the nearest point, if that is a local
-/// minimum of the distance from the triangles that the particle may touch, and comes near the particle.
-pub(super) struct NearbyWork<'a> {
+/// A particle, a triangle, and the part of it that is nearest.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct NearPoint {
+    pub(super) slot: u32,
+    pub(super) triangle: u32,
+    pub(super) feature: Feature,
+}
+
+/// Finds, for each particle and triangle in `pairs`, the part of the triangle with the nearest point, and passes it to
+/// `accept` if that is a local minimum of the distance from the triangles that the particle may touch, and comes near the
+/// particle.
+pub(super) struct NearbyWork<'a, F> {
     pub(super) surface: &'a Surface,
     pub(super) load_pairs: &'a LoadPairs,
     pub(super) search: &'a SurfaceSearch<'a>,
     pub(super) pairs: &'a [[u32; 2]],
-    pub(super) features: &'a mut Vec<Option<Feature>>,
+    pub(super) accept: &'a mut F,
 }
 
-impl LaneWork for NearbyWork<'_> {
-    type Output = ();
+impl<F: FnMut(NearPoint) -> Search> LaneWork for NearbyWork<'_, F> {
+    type Output = Search;
 
     #[inline(always)]
-    fn run<W: Wide>(self) {
-        let Self { surface, load_pairs, search, pairs, features } = self;
-        features.clear();
+    fn run<W: Wide>(self) -> Search {
+        let Self { surface, load_pairs, search, pairs, accept } = self;
         let (groups, rest) = pairs.as_chunks::<8>();
         for pairs in groups {
-            let NearLanes { on_face, near } = near_lanes::<W>(surface, search, pairs);
-            for (lane, pair) in pairs.iter().enumerate() {
-                features.push(if near & (1 << lane) == 0 {
-                    None
-                } else if on_face & (1 << lane) == 0 {
-                    nearby((surface, load_pairs), search, *pair)
+            let NearLanes { on_face, mut near } = near_lanes::<W>(surface, search, pairs);
+            while let Some(lane) = take_lowest(&mut near) {
+                let pair = pairs[lane as usize];
+                let point = if on_face & (1 << lane) == 0 {
+                    nearby((surface, load_pairs), search, pair)
                 } else {
-                    can_touch(surface, search.states, *pair).then_some(Feature::Face)
-                });
+                    let [slot, triangle] = pair;
+                    let feature = Feature::Face;
+                    let can_touch = can_touch(surface, search.states, pair);
+                    can_touch.then_some(NearPoint { slot, triangle, feature })
+                };
+                if let Some(point) = point {
+                    accept(point)?;
+                }
             }
         }
-        features.extend(rest.iter().map(|pair| nearby((surface, load_pairs), search, *pair)));
+        for pair in rest {
+            if let Some(point) = nearby((surface, load_pairs), search, *pair) {
+                accept(point)?;
+            }
+        }
+        Search::Continue(())
     }
 }
 
@@ -100,7 +120,7 @@ fn nearby(
     (surface, load_pairs): (&Surface, &LoadPairs),
     search: &SurfaceSearch<'_>,
     pair: [u32; 2],
-) -> Option<Feature> {
+) -> Option<NearPoint> {
     let SurfaceSearch { states, span, distance, .. } = *search;
     let [slot, triangle] = pair;
     let view = View { particles: states, slot, time: 0.0 };
@@ -112,7 +132,7 @@ fn nearby(
     let is_near = length < distance || point.dot(later) / length < distance;
     let is_minimum = || surface.nearer(triangle, &nearest, (view, load_pairs)).is_none();
     let is_found = is_near && can_touch(surface, states, pair) && is_minimum();
-    is_found.then_some(nearest.feature)
+    is_found.then_some(NearPoint { slot, triangle, feature: nearest.feature })
 }
 
 /// True if a particle is no corner of a triangle, which is whole, and one of them is free.
@@ -154,19 +174,18 @@ mod tests {
                     kernels,
                 };
                 let (surface, load_pairs, search) = (&surface, &load_pairs, &search);
-                let (pairs, mut features) = (&pairs, Vec::new());
-                let features_to = &mut features;
-                kernels.run(NearbyWork {
-                    surface,
-                    load_pairs,
-                    search,
-                    pairs,
-                    features: features_to,
-                });
-                let expected: Vec<_> =
-                    pairs.iter().map(|pair| nearby((surface, load_pairs), search, *pair)).collect();
-                assert_eq!(features, expected, "{kernels:?}");
-                face_count += features.iter().filter(|one| **one == Some(Feature::Face)).count();
+                let (pairs, mut found) = (&pairs, Vec::new());
+                let accept = &mut |point| {
+                    found.push(point);
+                    Search::Continue(())
+                };
+                let work = NearbyWork { surface, load_pairs, search, pairs, accept };
+                assert!(kernels.run(work).is_continue());
+                let expected =
+                    pairs.iter().map(|pair| nearby((surface, load_pairs), search, *pair));
+                let expected: Vec<_> = expected.flatten().collect();
+                assert_eq!(found, expected, "{kernels:?}");
+                face_count += found.iter().filter(|one| one.feature == Feature::Face).count();
             }
         }
         assert!(face_count > 50, "{face_count}");

@@ -1,19 +1,100 @@
-//! The triangles of a tile where they are now, to tell which have a point nearest to a particle.
+//! The triangles of tiles where they are now, to tell which have a point nearest to a particle.
 
-use super::super::tile::{TILE, TileColumn};
+use super::super::tile::{TILE, TILE_LENGTH, TileColumn};
 use super::nearest::{SIDE_TOLERANCE, clamped, inwards, next};
 use super::surface::Surface;
-use super::triangle_tile::gather;
+use super::triangle_tile::{TriangleTile, gather};
 use crate::kernels::lanes::{PackedParticle, Wide, axes};
 use crate::kernels::vectors::{difference, dot, scaled, sum};
 
 /// A vector for each triangle of a tile, by axis.
 type TileVectors = [TileColumn; 3];
 
+/// Number of tiles that are remembered: more than lie around a tile of particles, and few enough to stay in a near cache.
+const REMEMBERED: usize = 64;
+
+/// Memory of a worker for tiles that a search comes to again and again.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct NearTiles {
+    /// Tile n is at n modulo [`REMEMBERED`].
+    tiles: Vec<NearTile>,
+}
+
+/// A tile that the running search has come to.
+#[derive(Debug, Clone)]
+struct NearTile {
+    /// None if the search has come to none at this place.
+    index: Option<u32>,
+    has_spheres: bool,
+    is_placed: bool,
+    spheres: TriangleTile,
+    placed: PlacedTile,
+}
+
+impl NearTiles {
+    /// Makes room for tiles.
+    pub(crate) fn new() -> Self {
+        let none = NearTile {
+            index: None,
+            has_spheres: false,
+            is_placed: false,
+            spheres: TriangleTile::EMPTY,
+            placed: PlacedTile::default(),
+        };
+        Self { tiles: vec![none; REMEMBERED] }
+    }
+
+    /// Forgets all tiles.
+    pub(crate) fn clear(&mut self) {
+        for tile in &mut self.tiles {
+            tile.index = None;
+        }
+    }
+
+    #[inline(always)]
+    fn remember(&mut self, index: u32) -> &mut NearTile {
+        let tile = &mut self.tiles[index as usize % REMEMBERED];
+        if tile.index != Some(index) {
+            (tile.has_spheres, tile.is_placed) = (false, false);
+            tile.index = Some(index);
+        }
+        tile
+    }
+
+    /// The spheres of a tile of these triangles, in the middle of a span of twice `half` displacements.
+    #[inline(always)]
+    pub(super) fn spheres<W: Wide>(
+        &mut self,
+        (index, triangles): (u32, &[[u32; 3]]),
+        states: &[PackedParticle],
+        half: f32,
+    ) -> &TriangleTile {
+        let tile = self.remember(index);
+        if !std::mem::replace(&mut tile.has_spheres, true) {
+            tile.spheres.refit::<W>(triangles, states, half);
+        }
+        &tile.spheres
+    }
+
+    /// The edges of a tile.
+    #[inline(always)]
+    pub(super) fn placed<W: Wide>(
+        &mut self,
+        index: u32,
+        surface: &Surface,
+        states: &[PackedParticle],
+    ) -> &PlacedTile {
+        let tile = self.remember(index);
+        if !std::mem::replace(&mut tile.is_placed, true) {
+            tile.placed.place::<W>(surface, TILE_LENGTH * index, states);
+        }
+        &tile.placed
+    }
+}
+
 /// The edges of the triangles of a tile, and the half planes beside them.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct PlacedTile {
-    is_placed: bool,
     /// By edge, from each corner to the next.
     edges: [Edges; 3],
     /// Mean displacements of the corners.
@@ -47,23 +128,6 @@ struct Edges {
 }
 
 impl PlacedTile {
-    pub(super) fn clear(&mut self) {
-        self.is_placed = false;
-    }
-
-    /// Computes the edges of the triangles from `first` on, unless they are known.
-    #[inline(always)]
-    pub(super) fn place_if_clear<W: Wide>(
-        &mut self,
-        surface: &Surface,
-        first: u32,
-        states: &[PackedParticle],
-    ) {
-        if !std::mem::replace(&mut self.is_placed, true) {
-            self.place::<W>(surface, first, states);
-        }
-    }
-
     #[inline(always)]
     fn place<W: Wide>(&mut self, surface: &Surface, first: u32, states: &[PackedParticle]) {
         let first = first as usize;

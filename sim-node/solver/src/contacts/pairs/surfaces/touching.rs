@@ -2,6 +2,8 @@
 
 use glam::Vec3;
 
+use super::super::box_tree::Search;
+use super::super::gathered::Room;
 use super::super::load::LoadPairs;
 use super::candidate::Candidate;
 use super::contact::SurfaceContact;
@@ -10,17 +12,17 @@ use super::surface::{Surface, View, separation};
 use crate::kernels::lanes::{LaneWork, PackedParticle, Wide};
 
 /// Finds the candidates that are near at the end of the substep, and moves them on to the nearest triangles.
-pub(super) struct TouchWork<'a> {
+pub(super) struct TouchWork<'a, 'b> {
     pub(super) touching: Touching<'a>,
     pub(super) candidates: &'a mut [Candidate],
-    pub(super) near: &'a mut Vec<SurfaceContact>,
+    pub(super) near: &'a mut Room<'b, SurfaceContact>,
 }
 
-impl LaneWork for TouchWork<'_> {
-    type Output = ();
+impl LaneWork for TouchWork<'_, '_> {
+    type Output = Search;
 
     #[inline(always)]
-    fn run<W: Wide>(self) {
+    fn run<W: Wide>(self) -> Search {
         let Self { touching, candidates, near } = self;
         let mut faces = Faces::default();
         let (groups, rest) = candidates.as_chunks_mut::<8>();
@@ -31,18 +33,23 @@ impl LaneWork for TouchWork<'_> {
             }
             faces.find::<W>(touching.surface, touching.states, (slots, triangles));
             for (lane, candidate) in group.iter_mut().enumerate() {
-                near.extend(if faces.lanes & (1 << lane) != 0 {
+                let contact = if faces.lanes & (1 << lane) != 0 {
                     touching.contact_on_face(candidate, &faces, lane)
                 } else {
                     touching.walk_to_contact(candidate)
-                });
+                };
+                if let Some(contact) = contact {
+                    near.add(contact)?;
+                }
             }
         }
-        near.extend(rest.iter_mut().filter_map(|candidate| touching.walk_to_contact(candidate)));
+        let mut rest = rest.iter_mut().filter_map(|candidate| touching.walk_to_contact(candidate));
+        rest.try_for_each(|contact| near.add(contact))
     }
 }
 
 /// The conditions under which candidates touch.
+#[derive(Clone, Copy)]
 pub(super) struct Touching<'a> {
     pub(super) surface: &'a Surface,
     pub(super) load_pairs: &'a LoadPairs,

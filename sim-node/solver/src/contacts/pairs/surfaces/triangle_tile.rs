@@ -9,8 +9,6 @@ use crate::kernels::vectors::{difference, dot, scaled, sum};
 /// The spheres around the triangles of a tile in the middle of the time. Those with NaN are near nothing.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct TriangleTile {
-    /// True if the spheres are those of the running search.
-    pub(super) is_fitted: bool,
     /// The centroids, by axis.
     centers: [TileColumn; 3],
     /// Largest distances of a corner from the centroid.
@@ -23,7 +21,6 @@ pub(super) struct TriangleTile {
 
 impl TriangleTile {
     pub(super) const EMPTY: Self = Self {
-        is_fitted: false,
         centers: [[[f32::NAN; 8]; TILE / 8]; 3],
         radii: [[f32::NAN; 8]; TILE / 8],
         bounds: Bounds::EMPTY,
@@ -51,7 +48,6 @@ impl TriangleTile {
             self.set_spheres(group, corners);
         }
         (self.bounds, self.displacements) = (bounds.around_all(), displacements.around_all());
-        self.is_fitted = true;
     }
 
     #[inline(always)]

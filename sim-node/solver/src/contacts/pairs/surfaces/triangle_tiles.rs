@@ -1,37 +1,37 @@
 //! Tiles of triangles, to find those that particles come near.
 
-use super::super::box_tree::{Between, BoxTree, PairSearch, Roots, Search};
+use super::super::box_tree::{Between, BoxTree, NodePair, PairSearch, Roots, Search};
 use super::super::load::LaneMasks;
 use super::super::tile::{
     TILE, TILE_LENGTH, coordinates, lanes_in_box, mark_all, members, take_lowest,
 };
 use super::super::tile_tree::TileTree;
-use super::placed_tile::{Moving, PlacedTile};
+use super::placed_tile::{Moving, NearTiles};
 use super::surface::Surface;
 use super::triangle_tile::TriangleTile;
 use crate::contacts::bounds::Bounds;
 use crate::kernels::Kernels;
 use crate::kernels::lanes::{LaneWork, PackedParticle, Wide, axes};
 use crate::kernels::vectors::dot;
+use crate::store::workers::Workers;
 
 /// A bit for each triangle of a tile.
 const ALL_LANES: u32 = (1 << TILE_LENGTH) - 1;
 /// Number of pairs of tiles that are examined together.
-const TILE_PAIRS_MAX: usize = 4096;
+const TILE_PAIRS_MAX: usize = 512;
+/// Fewest tiles that a worker refits.
+const REFIT_MIN: usize = 64;
 
 /// The tiles, and the boxes above them.
 #[derive(Debug, Clone, Default)]
 pub(super) struct TriangleTiles {
+    /// Those with strays are fitted to the running search.
     tiles: Vec<TriangleTile>,
     boxes: BoxTree,
     /// By tile: a bit for each whole triangle with a stray at a corner. All triangles have one if all paths begin.
     strays: Vec<u16>,
-    /// Where the triangles of each tile are, if the running search has needed it.
-    placed: Vec<PlacedTile>,
-    /// Tiles of particles and of triangles that are near each other, to be examined.
-    tile_pairs: Vec<[u32; 2]>,
     /// Where the running search begins.
-    roots: Roots,
+    pub(super) roots: Roots,
 }
 
 impl TriangleTiles {
@@ -41,20 +41,34 @@ impl TriangleTiles {
             tiles: vec![TriangleTile::EMPTY; count],
             boxes: BoxTree::new(count),
             strays: vec![0; count],
-            placed: vec![PlacedTile::default(); count],
-            tile_pairs: Vec::with_capacity(TILE_PAIRS_MAX),
             roots: Roots::default(),
         }
     }
 
-    /// Replaces the spheres and boxes of tiles with strays by those of their paths.
-    pub(super) fn refit(&mut self, surface: &Surface, search: &SurfaceSearch<'_>) {
+    /// Replaces the spheres and boxes of tiles with strays by those of their paths, and finds where the search begins.
+    pub(super) fn prepare(
+        &mut self,
+        surface: &Surface,
+        search: &SurfaceSearch<'_>,
+        workers: &mut Workers,
+    ) {
         self.mark_strays(surface, search);
-        let Self { tiles, boxes, strays, .. } = self;
+        let Self { tiles, boxes, strays, roots } = self;
         boxes.mark(strays.iter().map(|lanes| *lanes != 0));
         boxes.refit(|leaves| {
-            search.kernels.run(RefitWork { tiles, leaves, strays, surface, search });
+            let kernels = workers.kernels;
+            let length = workers.part_length(leaves.len(), REFIT_MIN);
+            let tiles = tiles.chunks_mut(length).zip(leaves.chunks_mut(length));
+            let triangles = surface.corners.chunks(TILE * length).zip(strays.chunks(length));
+            workers.for_each(
+                tiles.zip(triangles),
+                |((tiles, leaves), (triangles, strays)), _| {
+                    kernels.run(RefitWork { tiles, leaves, strays, triangles, search });
+                },
+                |_| {},
+            );
         });
+        roots.find(Between([&search.tree.boxes, boxes]), search.distance, workers.kernels);
     }
 
     /// Marks the triangles with strays at their corners.
@@ -70,51 +84,46 @@ impl TriangleTiles {
         }
     }
 
-    /// Passes every particle and triangle to `accept` that may come nearer than the distance of the search, if there is a
-    /// stray among the particle and the corners of the triangle. `at_load` tells, for a tile of particles and one of
-    /// triangles, which were near each other at load.
+    /// Passes every particle and triangle below some of the roots to `accept` that may come nearer than the distance of the
+    /// search, if there is a stray among the particle and the corners of the triangle. `at_load` tells, for a tile of
+    /// particles and one of triangles, which were near each other at load.
     pub(super) fn search(
-        &mut self,
-        (surface, wanted): (&Surface, Wanted),
-        search: &SurfaceSearch<'_>,
+        &self,
+        (roots, near_tiles): (&[NodePair], &mut NearTiles),
+        (surface, search, wanted): (&Surface, &SurfaceSearch<'_>, Wanted),
         at_load: &impl Fn([u32; 2]) -> AtLoad,
         accept: &mut impl FnMut([u32; 2]) -> Search,
     ) -> Search {
-        let Self { tiles, boxes, strays, placed, tile_pairs, roots } = self;
-        let strays = &*strays;
-        placed.iter_mut().for_each(PlacedTile::clear);
-        let mut examine = |pairs: &mut Vec<[u32; 2]>| {
-            let (tiles, placed, accept) = (&mut *tiles, &mut *placed, &mut *accept);
-            let work = SearchWork {
+        let Self { tiles, boxes, strays, .. } = self;
+        let (distance, kernels) = (search.distance, search.kernels);
+        let mut examine = |pairs: &[[u32; 2]]| {
+            let (near_tiles, accept) = (&mut *near_tiles, &mut *accept);
+            kernels.run(SearchWork {
                 tiles,
                 strays,
-                placed,
+                near_tiles,
                 pairs,
                 search,
                 surface,
                 wanted,
                 at_load,
                 accept,
-            };
-            let found = search.kernels.run(work);
-            pairs.clear();
-            found
+            })
         };
-        let (distance, kernels) = (search.distance, search.kernels);
-        let nesting = Between([&search.tree.boxes, boxes]);
-        roots.find(nesting, distance, kernels);
+        let mut tile_pairs = [[0; 2]; TILE_PAIRS_MAX];
+        let mut count = 0;
         let add = &mut |pair| {
-            tile_pairs.push(pair);
-            let has_room = tile_pairs.len() < TILE_PAIRS_MAX;
-            if has_room { Search::Continue(()) } else { examine(tile_pairs) }
+            tile_pairs[count] = pair;
+            count += 1;
+            if count < TILE_PAIRS_MAX {
+                return Search::Continue(());
+            }
+            count = 0;
+            examine(&tile_pairs)
         };
-        let mut found =
-            kernels.run(PairSearch { nesting, roots: &roots.pairs, distance, accept: add });
-        if found.is_continue() {
-            found = examine(tile_pairs);
-        }
-        tile_pairs.clear();
-        found
+        let nesting = Between([&search.tree.boxes, boxes]);
+        kernels.run(PairSearch { nesting, roots, distance, accept: add })?;
+        examine(&tile_pairs[..count])
     }
 }
 
@@ -161,7 +170,7 @@ struct RefitWork<'a> {
     tiles: &'a mut [TriangleTile],
     leaves: &'a mut [Bounds],
     strays: &'a [u16],
-    surface: &'a Surface,
+    triangles: &'a [[u32; 3]],
     search: &'a SurfaceSearch<'a>,
 }
 
@@ -170,14 +179,13 @@ impl LaneWork for RefitWork<'_> {
 
     #[inline(always)]
     fn run<W: Wide>(self) {
-        let Self { tiles, leaves, strays, surface, search } = self;
+        let Self { tiles, leaves, strays, triangles, search } = self;
         let half = 0.5 * search.span;
         let leaves = leaves.iter_mut().zip(strays);
-        let triangles = surface.corners.chunks(TILE);
+        let triangles = triangles.chunks(TILE);
         for ((tile, (leaf, strays)), triangles) in tiles.iter_mut().zip(leaves).zip(triangles) {
             // The boxes of the others still hold, because they were made for a longer time.
-            tile.is_fitted = *strays != 0;
-            if tile.is_fitted {
+            if *strays != 0 {
                 tile.refit::<W>(triangles, search.states, half);
                 *leaf = tile.path_box(half);
             }
@@ -187,9 +195,9 @@ impl LaneWork for RefitWork<'_> {
 
 /// Examines pairs of a tile of particles and a tile of triangles.
 struct SearchWork<'a, A, F> {
-    tiles: &'a mut [TriangleTile],
+    tiles: &'a [TriangleTile],
     strays: &'a [u16],
-    placed: &'a mut [PlacedTile],
+    near_tiles: &'a mut NearTiles,
     pairs: &'a [[u32; 2]],
     search: &'a SurfaceSearch<'a>,
     surface: &'a Surface,
@@ -203,24 +211,27 @@ impl<A: Fn([u32; 2]) -> AtLoad, F: FnMut([u32; 2]) -> Search> LaneWork for Searc
 
     #[inline(always)]
     fn run<W: Wide>(self) -> Search {
-        let Self { tiles, strays, placed, pairs, search, surface, wanted, at_load, accept } = self;
+        let Self { tiles, strays, near_tiles, pairs, search, surface, wanted, at_load, accept } =
+            self;
         let SurfaceSearch { tree, states, passed, span, distance, .. } = *search;
         let half = 0.5 * span;
         let middle_time = passed + half;
         for &[left, right] in pairs {
-            let (tile, triangles) = (&tree.tiles[left as usize], &mut tiles[right as usize]);
             let first_triangle = TILE_LENGTH * right;
-            if !triangles.is_fitted {
-                triangles.refit::<W>(tile_of(surface, first_triangle), states, half);
-            }
+            let [stray_lanes, stray_triangles] =
+                [tree.strays[left as usize], strays[right as usize]].map(u32::from);
+            let (tile, triangles) = if stray_triangles == 0 {
+                let triangles = (right, tile_of(surface, first_triangle));
+                (&tree.tiles[left as usize], near_tiles.spheres::<W>(triangles, states, half))
+            } else {
+                (&tree.tiles[left as usize], &tiles[right as usize])
+            };
             // A particle and a triangle that meet at any time are at most this far apart in the middle of the time.
             let relative =
                 tree.displacements[left as usize].distances_max(&triangles.displacements);
             let reach = axes(|axis| distance + half * relative[axis]);
             let middles = tile.positions::<W>(middle_time);
             let mut lanes = lanes_in_box(&middles, &triangles.bounds.grown_by(reach));
-            let [stray_lanes, stray_triangles] =
-                [tree.strays[left as usize], strays[right as usize]].map(u32::from);
             if stray_triangles == 0 {
                 lanes &= stray_lanes;
             }
@@ -239,8 +250,7 @@ impl<A: Fn([u32; 2]) -> AtLoad, F: FnMut([u32; 2]) -> Search> LaneWork for Searc
                     near &= spheres.lanes_around([x[lane], y[lane], z[lane]]);
                 }
                 if near != 0 && wanted == Wanted::Nearest {
-                    let placed = &mut placed[right as usize];
-                    placed.place_if_clear::<W>(surface, first_triangle, states);
+                    let placed = near_tiles.placed::<W>(right, surface, states);
                     let PackedParticle([x, y, z, _, dx, dy, dz, _]) = states[slot as usize];
                     let position = [x, y, z];
                     let moving = Moving { position, displacement: [dx, dy, dz] };
