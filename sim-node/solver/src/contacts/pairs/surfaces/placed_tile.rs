@@ -11,7 +11,7 @@ use crate::kernels::vectors::{difference, dot, scaled, sum};
 type TileVectors = [TileColumn; 3];
 
 /// Number of tiles that are remembered: more than lie around a tile of particles, and few enough to stay in a near cache.
-const REMEMBERED: usize = 64;
+const REMEMBERED: u32 = 64;
 
 /// Memory of a worker for tiles that a search comes to again and again.
 #[derive(Debug, Clone, Default)]
@@ -41,7 +41,7 @@ impl NearTiles {
             spheres: TriangleTile::EMPTY,
             placed: PlacedTile::default(),
         };
-        Self { tiles: vec![none; REMEMBERED] }
+        Self { tiles: vec![none; REMEMBERED as usize] }
     }
 
     /// Forgets all tiles.
@@ -53,7 +53,7 @@ impl NearTiles {
 
     #[inline(always)]
     fn remember(&mut self, index: u32) -> &mut NearTile {
-        let tile = &mut self.tiles[index as usize % REMEMBERED];
+        let tile = &mut self.tiles[(index % REMEMBERED) as usize];
         if tile.index != Some(index) {
             (tile.has_spheres, tile.is_placed) = (false, false);
             tile.index = Some(index);
@@ -71,6 +71,8 @@ impl NearTiles {
     ) -> &TriangleTile {
         let tile = self.remember(index);
         if !std::mem::replace(&mut tile.has_spheres, true) {
+            // The last tile may not be full: nothing may be left of the tile before in this place.
+            tile.spheres = TriangleTile::EMPTY;
             tile.spheres.refit::<W>(triangles, states, half);
         }
         &tile.spheres
@@ -271,4 +273,52 @@ fn set<W: Wide>(vectors: &mut TileVectors, group: usize, vector: [W; 3]) {
 fn paths<W: Wide>(states: &[PackedParticle], slots: impl Iterator<Item = u32>) -> [[W; 3]; 2] {
     let [[x, y, z, _], [dx, dy, dz, _]] = W::columns(&gather(states, slots));
     [[x, y, z], [dx, dy, dz]]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::samples::{sheet, surface_of};
+    use super::*;
+    use crate::kernels::Kernels;
+    use crate::kernels::lanes::LaneWork;
+    use crate::scene::model::Model;
+
+    /// Counts the triangles of a tile that are within 100 m.
+    struct Count<'a>(&'a mut NearTiles, (u32, &'a [[u32; 3]]), &'a [PackedParticle]);
+
+    impl LaneWork for Count<'_> {
+        type Output = u32;
+
+        #[inline(always)]
+        fn run<W: Wide>(self) -> u32 {
+            let Self(near_tiles, tile, states) = self;
+            let spheres = near_tiles.spheres::<W>(tile, states, 0.0).grown::<W>(100.0);
+            spheres.lanes_around([0.0; 3]).count_ones()
+        }
+    }
+
+    fn states(model: &Model, particles: &[u32]) -> Vec<PackedParticle> {
+        let state = |particle: &u32| {
+            let [x, y, z] = model.particles[*particle as usize].position;
+            PackedParticle([x, y, z, 1.0, 0.0, 0.0, 0.0, 0.0])
+        };
+        particles.iter().map(state).collect()
+    }
+
+    #[test]
+    fn a_tile_that_is_not_full_holds_nothing_of_the_one_before_in_its_place() {
+        let model = sheet(24, 0.5);
+        let (surface, particles) = surface_of(&model);
+        let states = states(&model, &particles);
+        let last = u32::try_from(surface.corners.len() / TILE).unwrap();
+        assert!(last >= REMEMBERED && surface.corners.len() % TILE == 2);
+        for kernels in Kernels::available() {
+            let mut near_tiles = NearTiles::new();
+            for (tile, expected) in [(last % REMEMBERED, 16), (last, 2), (last - 1, 16)] {
+                let triangles = surface.corners.chunks(TILE).nth(tile as usize).unwrap();
+                let count = kernels.run(Count(&mut near_tiles, (tile, triangles), &states));
+                assert_eq!(count, expected, "{kernels:?}, {tile}");
+            }
+        }
+    }
 }
