@@ -32,6 +32,8 @@ type Job<'a> = dyn Fn(usize) + Sync + 'a;
 pub(crate) struct WorkerPool {
     slot: Arc<JobSlot>,
     others: Vec<JoinHandle<()>>,
+    /// There are more workers than processors.
+    is_crowded: bool,
     /// Number of jobs before the running step.
     jobs_before: u64,
 }
@@ -84,18 +86,19 @@ impl WorkerPool {
             thread.spawn(move || slot.serve(worker)).ok()
         };
         let others = (1..=others).map_while(start).collect();
-        Self { slot, others, jobs_before: 0 }
+        Self { slot, others, is_crowded, jobs_before: 0 }
     }
 
     pub(crate) fn worker_count(&self) -> usize {
         self.others.len() + 1
     }
 
-    /// Wakes the workers, and lets them wait for jobs without parking, if the step before had any.
+    /// Wakes the workers, and lets them wait for jobs without parking, if the step before had any and each worker can have a
+    /// processor.
     pub(crate) fn begin_step(&mut self) {
         let job_count = self.slot.job_count.load(Ordering::Relaxed);
         let had_jobs = std::mem::replace(&mut self.jobs_before, job_count) != job_count;
-        if had_jobs {
+        if had_jobs && !self.is_crowded {
             self.slot.is_stepping.store(true, Ordering::SeqCst);
             self.wake();
         }
@@ -305,6 +308,32 @@ mod tests {
             }
             pool.for_each(&mut parts, |part| *part += 1);
             assert_eq!(parts, [round; 3]);
+        }
+    }
+
+    #[test]
+    fn workers_stay_awake_in_a_step_after_one_with_jobs() {
+        let mut pool = WorkerPool::new(2);
+        pool.is_crowded = false;
+        let is_parked = |pool: &WorkerPool| pool.slot.is_parked[0].load(Ordering::SeqCst);
+        pool.begin_step();
+        assert!(!pool.slot.is_stepping.load(Ordering::SeqCst), "there was no job yet");
+        pool.for_each(&mut [0, 1], |part| *part += 1);
+        pool.end_step();
+        while !is_parked(&pool) {
+            thread::yield_now();
+        }
+        pool.begin_step();
+        // It wakes without a job.
+        while is_parked(&pool) {
+            thread::yield_now();
+        }
+        let mut parts = [0, 1];
+        pool.for_each(&mut parts, |part| *part += 1);
+        assert_eq!(parts, [1, 2]);
+        pool.end_step();
+        while !is_parked(&pool) {
+            thread::yield_now();
         }
     }
 
