@@ -1,8 +1,8 @@
 //! Threads that work on one job at a time.
 //!
 //! A job within a step takes a few microseconds, so workers spin while they wait for one; between
-//! steps they park, and the next step wakes them before it needs them. A job is always divided in the same way and parts are never stolen, so the
-//! assignment of threads changes no bit.
+//! steps they park, and the next step wakes them before it needs them. A job is always divided in the same
+//! way and parts are never stolen, so the assignment of threads changes no bit.
 #![allow(unsafe_code, reason = "lends work to threads that outlive it; see `WorkerPool::run`")]
 
 use std::cell::{Cell, UnsafeCell};

@@ -6,6 +6,9 @@ use crate::store::workers::{WorkerScratch, Workers};
 /// Number of parts for each worker where some parts take longer than others.
 const PARTS_PER_WORKER: usize = 8;
 
+/// Items for which each worker has room at least: as many as its part of a short list has.
+const SHARE_MIN: usize = 512;
+
 /// Divides items whose work differs into parts of this length, of which each worker does several.
 pub(super) fn parts<'a, P>(all: &'a [P], workers: &Workers) -> (&'a [P], usize) {
     (all, all.len().div_ceil(PARTS_PER_WORKER * workers.count()).max(1))
@@ -24,8 +27,11 @@ pub(super) struct Gathered<T> {
 #[derive(Debug, Clone)]
 struct Share<T> {
     items: Vec<T>,
+    count_max: usize,
     /// By part: the number of items at its end.
     ends: Vec<usize>,
+    /// It had no room for all.
+    is_full: bool,
 }
 
 /// A list with a largest number of items.
@@ -58,19 +64,25 @@ impl<T> Gathered<T> {
         Self { items: Vec::with_capacity(count_max), count_max, shares: Vec::new() }
     }
 
-    /// Makes room for what each of these workers finds.
+    /// Makes room for what each of these workers finds: twice its share, if all find equally much.
     pub(super) fn set_worker_count(&mut self, count: usize) {
-        let count = if count > 1 { count } else { 0 };
-        self.shares.resize_with(count, || Share {
-            items: Vec::with_capacity(self.count_max + 1),
-            ends: Vec::with_capacity(PARTS_PER_WORKER),
-        });
+        self.shares.clear();
+        if count > 1 {
+            let count_max = (2 * self.count_max.div_ceil(count)).max(SHARE_MIN);
+            self.shares.resize_with(count, || Share {
+                items: Vec::with_capacity(count_max),
+                count_max,
+                ends: Vec::with_capacity(PARTS_PER_WORKER),
+                is_full: false,
+            });
+        }
     }
 }
 
 impl<T: Copy + Send> Gathered<T> {
     /// Lets the workers add what they find in the parts of `all`, each of this length, and appends it in the order of the
-    /// parts. Breaks, with the first items that have room, if there are too many.
+    /// parts. Breaks, with the first items that have room, if there are too many. If a worker has no room for its share, one
+    /// worker finds all, so nothing depends on the number of workers.
     ///
     /// # Panics
     /// If there are more than [`PARTS_PER_WORKER`] parts for each worker.
@@ -87,24 +99,25 @@ impl<T: Copy + Send> Gathered<T> {
             return find(all, &mut Room { items, count_max: *count_max }, workers.own_scratch());
         }
         assert!(part_count <= PARTS_PER_WORKER * worker_count, "too many parts");
-        // One item more than fits tells that there are too many.
-        let room = *count_max - items.len() + 1;
         workers.for_each(
             shares[..worker_count].iter_mut().enumerate(),
             |(worker, share), scratch| {
                 share.clear();
                 // Neighbouring parts, which often take equally long, go to different workers.
                 for part in all.chunks(part_length).skip(*worker).step_by(worker_count) {
-                    // Without room, the parts behind this one find nothing, and are not needed.
-                    share.add(room, |room| find(part, room, scratch));
+                    share.add(|room| find(part, room, scratch));
                 }
             },
             |_| {},
         );
+        if shares[..worker_count].iter().any(|share| share.is_full) {
+            return find(all, &mut Room { items, count_max: *count_max }, workers.own_scratch());
+        }
         self.join(part_count, worker_count)
     }
 
-    /// The same for items that the workers change. Each has one part, of at least `length_min` items.
+    /// The same for items that the workers change. Each has one part, of at least `length_min` items, and finds at most one
+    /// for each of them.
     pub(super) fn extend_from<P: Send>(
         &mut self,
         workers: &mut Workers,
@@ -117,15 +130,15 @@ impl<T: Copy + Send> Gathered<T> {
         if part_count.min(shares.len()) <= 1 {
             return find(all, &mut Room { items, count_max: *count_max });
         }
-        let room = *count_max - items.len() + 1;
         workers.for_each(
             shares.iter_mut().zip(all.chunks_mut(part_length)),
             |(share, part), _| {
                 share.clear();
-                share.add(room, |room| find(part, room));
+                share.add(|room| find(part, room));
             },
             |_| {},
         );
+        assert!(shares[..part_count].iter().all(|share| !share.is_full), "too many items");
         self.join(part_count, part_count)
     }
 
@@ -148,13 +161,17 @@ impl<T> Share<T> {
     fn clear(&mut self) {
         self.items.clear();
         self.ends.clear();
+        self.is_full = false;
     }
 
     /// Adds what is found in a part.
-    fn add(&mut self, count_max: usize, find: impl FnOnce(&mut Room<'_, T>) -> Search) {
-        let _end = find(&mut Room { items: &mut self.items, count_max });
+    fn add(&mut self, find: impl FnOnce(&mut Room<'_, T>) -> Search) {
+        let Self { items, count_max, .. } = self;
+        let found = find(&mut Room { items, count_max: *count_max });
+        self.is_full |= found.is_break();
         self.ends.push(self.items.len());
     }
+
     fn of_part(&self, part: usize) -> &[T] {
         let start = part.checked_sub(1).map_or(0, |before| self.ends[before]);
         &self.items[start..self.ends[part]]
@@ -166,34 +183,46 @@ mod tests {
     use super::*;
     use crate::kernels::Kernels;
 
-    /// Adds the numbers that divide by 3, as long as there is room.
-    fn gather(count_max: usize, worker_count: usize) -> (Vec<u32>, bool) {
-        let all: Vec<u32> = (0..1000).collect();
+    /// Adds the numbers below 10,000 that fulfil a condition, as long as there is room.
+    fn gather(
+        count_max: usize,
+        worker_count: usize,
+        condition: impl Fn(u32) -> bool + Sync,
+    ) -> (Vec<u32>, bool) {
+        let all: Vec<u32> = (0..10_000).collect();
         let mut workers = Workers::new(Kernels::Reference, worker_count);
         let mut found = Gathered::new(count_max);
         found.set_worker_count(worker_count);
         found.items.push(7);
         let parts = parts(&all, &workers);
         let end = found.extend(&mut workers, parts, |part, found, _| {
-            part.iter().filter(|one| *one % 3 == 0).try_for_each(|one| found.add(*one))
+            let mut wanted = part.iter().copied().filter(|one| condition(*one));
+            wanted.try_for_each(|one| found.add(one))
         });
         (found.items, end.is_break())
     }
 
     #[test]
     fn workers_find_what_one_worker_finds_in_the_same_order() {
-        // There are 334 of them.
-        for count_max in [1, 2, 100, 334, 335, 336, 1000] {
-            let expected = gather(count_max, 1);
-            assert_eq!(expected.1, count_max < 335, "{count_max}");
+        // 3,334 of them.
+        let thirds = |one: u32| one.is_multiple_of(3);
+        for count_max in [1, 2, 1000, 3334, 3335, 3336, 10_000] {
+            let expected = gather(count_max, 1, thirds);
+            assert_eq!(expected.1, count_max < 3335, "{count_max}");
             for worker_count in [2, 3, 8] {
-                assert_eq!(
-                    gather(count_max, worker_count),
-                    expected,
-                    "{count_max}, {worker_count}"
-                );
+                let found = gather(count_max, worker_count, thirds);
+                assert_eq!(found, expected, "{count_max}, {worker_count}");
             }
         }
+    }
+
+    #[test]
+    fn one_worker_finds_all_if_another_has_no_room_for_its_share() {
+        // The parts of one of eight workers, which has room for 1,000.
+        let of_one_worker = |one: u32| (one / 157).is_multiple_of(8);
+        let expected = gather(4000, 1, of_one_worker);
+        assert_eq!(expected.0.len(), 1 + 8 * 157);
+        assert_eq!(gather(4000, 8, of_one_worker), expected);
     }
 
     #[test]

@@ -42,9 +42,6 @@ use triangle_tiles::{AtLoad, TriangleTiles, Wanted};
 /// Largest number of triangles that a particle never touches, on average. Further ones touch it as all others.
 const NEVER_PER_PARTICLE: usize = 128;
 
-/// Nearest points for each candidate for which several workers have room: triangles at an edge or a corner share theirs.
-/// With more, one worker searches.
-const POINTS_PER_CANDIDATE: usize = 2;
 /// Fewest candidates that a worker examines.
 const TOUCH_MIN: usize = 128;
 
@@ -116,9 +113,7 @@ impl SurfaceContacts {
     /// Makes room for what each of these workers finds.
     pub(super) fn set_worker_count(&mut self, count: usize) {
         // One worker adds each point as soon as it is found.
-        let point_count =
-            if count > 1 { POINTS_PER_CANDIDATE * self.candidate_count_max } else { 0 };
-        self.points = Gathered::new(point_count);
+        self.points = Gathered::new(if count > 1 { self.candidate_count_max } else { 0 });
         self.points.set_worker_count(count);
         self.kept.set_worker_count(count);
         self.near.set_worker_count(count);
