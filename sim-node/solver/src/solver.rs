@@ -146,7 +146,6 @@ impl Solver {
         if solver.colliders.iter().any(|collider| collider.mesh.is_some()) {
             solver.store.reserve_mesh_contacts(particle_count);
         }
-        solver.store.reserve_surface_contacts(scene.contact.mode == ContactMode::Surfaces);
         if solver.has_bodies() {
             solver.body_contacts = BodyContacts::new(particle_count);
         }

@@ -13,7 +13,7 @@ mod paths;
 mod publish;
 mod pulls;
 mod rows;
-mod strays;
+pub(crate) mod strays;
 mod survey;
 pub(crate) mod workers;
 
@@ -24,7 +24,7 @@ use layout::Layout;
 pub(crate) use layout::{Configured, Location, SceneFields, TetherPlace};
 use patch::Patch;
 use patch::sheets::{Found, families_of, find_sheet, loose_particles, pure_sheets};
-pub(crate) use paths::{Paths, Progress, StrayMarks};
+pub(crate) use paths::{Paths, Progress};
 pub(crate) use pulls::{Receivers, TetherEnds};
 use rows::Rows;
 use survey::Survey;
@@ -295,12 +295,6 @@ impl ParticleStore {
     /// Makes room for contacts of this number of particles with meshes.
     pub(crate) fn reserve_mesh_contacts(&mut self, particle_count: usize) {
         self.contact_room.near_mesh_count = particle_count;
-        self.workers.reserve_contacts(self.contact_room);
-    }
-
-    /// Makes room for contacts of cloths as surfaces, if the scene has any.
-    pub(crate) fn reserve_surface_contacts(&mut self, has_surfaces: bool) {
-        self.contact_room.has_surfaces = has_surfaces;
         self.workers.reserve_contacts(self.contact_room);
     }
 

@@ -50,8 +50,6 @@ pub(crate) struct ContactRoom {
     pub(crate) block_length: usize,
     /// Number of particles that can be near a mesh; 0 in a scene without meshes.
     pub(crate) near_mesh_count: usize,
-    /// True if cloths touch as surfaces.
-    pub(crate) has_surfaces: bool,
 }
 
 /// A particle inside an obstacle.

@@ -20,13 +20,12 @@ mod tile;
 mod tile_tree;
 
 use box_tree::Search;
-use gathered::{Gathered, Room};
+use gathered::{Gathered, NO_SCRATCHES, Room};
 pub(crate) use load::CONNECTED_REACH;
 use load::{LaneMasks, LoadPairs};
 use loading::load_states;
 use order::{order_by_key, order_key};
 use pair::Pair;
-pub(crate) use surfaces::NearTiles;
 use surfaces::{SurfaceContacts, SurfaceSearch};
 use tile::{TILE, TILE_LENGTH, members, take_lowest};
 use tile_tree::{Query, TileTree, search_order};
@@ -37,8 +36,9 @@ use crate::scene::definition::contact::ContactMode;
 use crate::scene::model::Model;
 use crate::state::tear::Torn;
 use crate::step::substep::Substep;
+use crate::store::strays::StrayMarks;
 use crate::store::workers::Workers;
-use crate::store::{Location, ParticleStore, Paths, Progress, StrayMarks};
+use crate::store::{Location, ParticleStore, Paths, Progress};
 
 /// Pairs within this number of contact distances at the start of the stage take part in it, because
 /// another contact may push them together.
@@ -214,11 +214,10 @@ impl ParticleContacts {
         let Self { states, ordered, near, surfaces, thickness, .. } = self;
         near.items.clear();
         let part_length = workers.part_length(ordered.len(), NEAR_MIN);
-        let _has_room = near.extend(workers, (ordered, part_length), |pairs, near, _| {
-            pairs
-                .iter()
-                .filter(|pair| pair.is_near(states, REACH))
-                .try_for_each(|pair| near.add(*pair))
+        let (parts, scratches) = ((ordered.as_slice(), part_length), &mut NO_SCRATCHES.clone());
+        let _has_room = near.extend(workers, parts, scratches, |pairs, near, ()| {
+            let mut pairs = pairs.iter().filter(|pair| pair.is_near(states, REACH));
+            pairs.try_for_each(|pair| near.add(*pair))
         });
         for pair in &near.items {
             pair.push_apart(states, friction);

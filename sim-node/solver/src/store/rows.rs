@@ -9,11 +9,10 @@ mod forces;
 mod layout;
 mod measure;
 pub(crate) mod particles;
-mod paths;
+pub(crate) mod paths;
 
 pub(crate) use forces::RowForces;
 pub(crate) use layout::{LINE_LENGTH, RowLayout, STATE_FIELDS};
-pub(crate) use paths::ComparedRows;
 
 use crate::kernels::huge_pages::refill;
 use crate::kernels::lanes::axes;

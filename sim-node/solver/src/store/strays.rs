@@ -1,9 +1,16 @@
 //! Follows all particles along their paths, and finds those that have left theirs.
 
-use super::paths::{COMPARED_MIN, Compared, ComparedGraph, NO_SLOT, Paths, Progress, StrayMarks};
+use std::iter;
+
+use super::paths::{NO_SLOT, Paths, Progress};
 use super::rows::Rows;
+use super::rows::paths::ComparedRows;
+use super::workers::Workers;
 use super::{Location, ParticleStore};
-use crate::kernels::lanes::PackedParticle;
+use crate::kernels::lanes::{LaneWork, PackedParticle, Wide};
+
+/// Fewest particles that a worker compares with their paths.
+const COMPARED_MIN: usize = 1024;
 
 impl ParticleStore {
     /// Replaces the paths with those that the particles are about to take.
@@ -75,4 +82,122 @@ impl ParticleStore {
         strays.merge();
         is_one_too_far
     }
+}
+
+/// Particles of the graph with their paths.
+#[derive(Clone, Copy)]
+struct ComparedGraph<'a> {
+    now: &'a [PackedParticle],
+    saved: &'a [PackedParticle],
+    slots: &'a [u32],
+}
+
+impl<'a> ComparedGraph<'a> {
+    /// Divides the particles into parts of this length.
+    fn chunks(self, length: usize) -> impl ExactSizeIterator<Item = Self> + use<'a> {
+        let length = length.next_multiple_of(8);
+        let paths = self.saved.chunks(length).zip(self.slots.chunks(length));
+        self.now.chunks(length).zip(paths).map(|(now, (saved, slots))| Self { now, saved, slots })
+    }
+
+    /// Marks the particles that are beside their paths. Returns true if one is too far.
+    #[inline(always)]
+    fn mark_strays<W: Wide>(self, progress: Progress, strays: &mut [u16]) -> bool {
+        let (now, now_rest) = self.now.as_chunks();
+        let (saved, saved_rest) = self.saved.as_chunks();
+        let (slots, slots_rest) = self.slots.as_chunks();
+        let mut is_one_too_far = false;
+        for ((now, saved), slots) in now.iter().zip(saved).zip(slots) {
+            let squares = squares::<W>(now, saved, progress);
+            is_one_too_far |= progress.mark_strays(squares, slots, strays);
+        }
+        let mut last = [[PackedParticle::default(); 8]; 2];
+        last[0][..now_rest.len()].copy_from_slice(now_rest);
+        last[1][..saved_rest.len()].copy_from_slice(saved_rest);
+        let mut last_slots = [NO_SLOT; 8];
+        last_slots[..slots_rest.len()].copy_from_slice(slots_rest);
+        let squares = squares::<W>(&last[0], &last[1], progress);
+        is_one_too_far | progress.mark_strays(squares, &last_slots, strays)
+    }
+}
+
+/// The marks of strays: entry i has the bits of the slots 16 i to 16 i + 15.
+pub(crate) struct StrayMarks<'a> {
+    pub(crate) all: &'a mut [u16],
+    /// By worker, without the first: its own marks. No bit is set before and after.
+    pub(crate) of_others: &'a mut [Vec<u16>],
+}
+
+impl StrayMarks<'_> {
+    /// Compares parts of the particles with their paths, each by one worker. Returns true if one is too far from its own.
+    fn mark<'p>(
+        &mut self,
+        workers: &mut Workers,
+        progress: Progress,
+        parts: impl ExactSizeIterator<Item = Compared<'p>>,
+    ) -> bool {
+        assert!(parts.len() <= 1 + self.of_others.len(), "a worker has no marks");
+        let kernels = workers.kernels;
+        let of_others = self.of_others.iter_mut().map(Vec::as_mut_slice);
+        let marks = iter::once(&mut *self.all).chain(of_others);
+        let parts = parts.zip(marks).map(|(compared, strays)| (compared, strays, false));
+        let mut is_one_too_far = false;
+        workers.for_each(
+            parts,
+            |(compared, strays, is_too_far), _| {
+                *is_too_far = kernels.run(StrayWork { compared: *compared, progress, strays });
+            },
+            |(_, _, is_too_far)| is_one_too_far |= is_too_far,
+        );
+        is_one_too_far
+    }
+
+    /// Moves the marks of the others to the first ones.
+    fn merge(self) {
+        for marks in self.of_others {
+            for (all, mark) in self.all.iter_mut().zip(marks) {
+                *all |= std::mem::take(mark);
+            }
+        }
+    }
+}
+
+/// Compares particles with their paths. The output is true if one is too far from its own.
+struct StrayWork<'a> {
+    compared: Compared<'a>,
+    progress: Progress,
+    strays: &'a mut [u16],
+}
+
+/// Particles with their paths.
+#[derive(Clone, Copy)]
+enum Compared<'a> {
+    Graph(ComparedGraph<'a>),
+    Rows(ComparedRows<'a>),
+}
+
+impl LaneWork for StrayWork<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<W: Wide>(self) -> bool {
+        let Self { compared, progress, strays } = self;
+        match compared {
+            Compared::Graph(graph) => graph.mark_strays::<W>(progress, strays),
+            Compared::Rows(rows) => rows.mark_strays::<W>(progress, strays),
+        }
+    }
+}
+
+/// Squares of the distances of particles from their paths.
+#[inline(always)]
+fn squares<W: Wide>(
+    now: &[PackedParticle; 8],
+    saved: &[PackedParticle; 8],
+    progress: Progress,
+) -> W {
+    let [[x, y, z, _], [dx, dy, dz, _]] = W::columns(now);
+    let now = [[x, y, z], [dx, dy, dz]];
+    let [[x, y, z, _], [dx, dy, dz, _]] = W::columns(saved);
+    progress.squares(now, [[x, y, z], [dx, dy, dz]])
 }

@@ -3,7 +3,6 @@
 use crate::constraints::bends::block::BendBlock;
 use crate::constraints::projection_block::ProjectionBlock;
 use crate::contacts::contact::{ContactRoom, Contacts};
-use crate::contacts::pairs::NearTiles;
 use crate::kernels::Kernels;
 use crate::kernels::worker_pool::{WORKERS_MAX, WorkerPool};
 
@@ -20,7 +19,6 @@ pub(crate) struct Workers {
 #[repr(align(128))]
 pub(crate) struct WorkerScratch {
     pub(crate) contacts: Contacts,
-    pub(crate) near_tiles: NearTiles,
     pub(crate) block: Box<ProjectionBlock>,
     pub(crate) bends: Box<BendBlock>,
 }
@@ -56,15 +54,6 @@ impl Workers {
     pub(crate) fn reserve_contacts(&mut self, room: ContactRoom) {
         for scratch in &mut self.scratches {
             scratch.contacts = Contacts::new(room);
-            scratch.near_tiles =
-                if room.has_surfaces { NearTiles::new() } else { NearTiles::default() };
-        }
-    }
-
-    /// Forgets the tiles that searches have come to.
-    pub(crate) fn clear_near_tiles(&mut self) {
-        for scratch in &mut self.scratches {
-            scratch.near_tiles.clear();
         }
     }
 

@@ -1,13 +1,17 @@
 //! Lists that several workers fill.
 
 use super::box_tree::Search;
-use crate::store::workers::{WorkerScratch, Workers};
+use crate::kernels::worker_pool::WORKERS_MAX;
+use crate::store::workers::Workers;
 
 /// Number of parts for each worker where some parts take longer than others.
 const PARTS_PER_WORKER: usize = 8;
 
 /// Items for which each worker has room at least: as many as its part of a short list has.
 const SHARE_MIN: usize = 512;
+
+/// Scratch memory of workers that need none.
+pub(super) const NO_SCRATCHES: [(); WORKERS_MAX] = [(); WORKERS_MAX];
 
 /// Divides items whose work differs into parts of this length, of which each worker does several.
 pub(super) fn parts<'a, P>(all: &'a [P], workers: &Workers) -> (&'a [P], usize) {
@@ -19,11 +23,11 @@ pub(super) fn parts<'a, P>(all: &'a [P], workers: &Workers) -> (&'a [P], usize) 
 pub(super) struct Gathered<T> {
     pub(super) items: Vec<T>,
     count_max: usize,
-    /// What each worker has found. Empty with one worker.
+    /// The items of each worker. Empty with one worker.
     shares: Vec<Share<T>>,
 }
 
-/// What a worker has found.
+/// The items of one worker.
 #[derive(Debug, Clone)]
 struct Share<T> {
     items: Vec<T>,
@@ -82,26 +86,28 @@ impl<T> Gathered<T> {
 impl<T: Copy + Send> Gathered<T> {
     /// Lets the workers add what they find in the parts of `all`, each of this length, and appends it in the order of the
     /// parts. Breaks, with the first items that have room, if there are too many. If a worker has no room for its share, one
-    /// worker finds all, so nothing depends on the number of workers.
+    /// worker finds all, so nothing depends on the number of workers. Each worker has a scratch memory, the calling one
+    /// the first.
     ///
     /// # Panics
-    /// If there are more than [`PARTS_PER_WORKER`] parts for each worker.
-    pub(super) fn extend<P: Sync>(
+    /// If there are more than [`PARTS_PER_WORKER`] parts for each worker, or no scratch memory for one.
+    pub(super) fn extend<P: Sync, S: Send>(
         &mut self,
         workers: &mut Workers,
         (all, part_length): (&[P], usize),
-        find: impl Fn(&[P], &mut Room<'_, T>, &mut WorkerScratch) -> Search + Sync,
+        scratches: &mut [S],
+        find: impl Fn(&[P], &mut Room<'_, T>, &mut S) -> Search + Sync,
     ) -> Search {
         let Self { items, count_max, shares } = self;
         let part_count = all.len().div_ceil(part_length);
         let worker_count = shares.len().min(workers.count()).min(part_count);
         if worker_count <= 1 {
-            return find(all, &mut Room { items, count_max: *count_max }, workers.own_scratch());
+            return find(all, &mut Room { items, count_max: *count_max }, &mut scratches[0]);
         }
         assert!(part_count <= PARTS_PER_WORKER * worker_count, "too many parts");
         workers.for_each(
-            shares[..worker_count].iter_mut().enumerate(),
-            |(worker, share), scratch| {
+            shares[..worker_count].iter_mut().zip(&mut *scratches).enumerate(),
+            |(worker, (share, scratch)), _| {
                 share.clear();
                 // Neighbouring parts, which often take equally long, go to different workers.
                 for part in all.chunks(part_length).skip(*worker).step_by(worker_count) {
@@ -111,7 +117,7 @@ impl<T: Copy + Send> Gathered<T> {
             |_| {},
         );
         if shares[..worker_count].iter().any(|share| share.is_full) {
-            return find(all, &mut Room { items, count_max: *count_max }, workers.own_scratch());
+            return find(all, &mut Room { items, count_max: *count_max }, &mut scratches[0]);
         }
         self.join(part_count, worker_count)
     }
@@ -195,10 +201,11 @@ mod tests {
         found.set_worker_count(worker_count);
         found.items.push(7);
         let parts = parts(&all, &workers);
-        let end = found.extend(&mut workers, parts, |part, found, _| {
-            let mut wanted = part.iter().copied().filter(|one| condition(*one));
-            wanted.try_for_each(|one| found.add(one))
-        });
+        let end =
+            found.extend(&mut workers, parts, &mut NO_SCRATCHES.clone(), |part, found, ()| {
+                let mut wanted = part.iter().copied().filter(|one| condition(*one));
+                wanted.try_for_each(|one| found.add(one))
+            });
         (found.items, end.is_break())
     }
 

@@ -19,7 +19,7 @@ mod triangle_tile;
 mod triangle_tiles;
 
 use super::box_tree::Search;
-use super::gathered::Gathered;
+use super::gathered::{Gathered, NO_SCRATCHES};
 use super::load::{self, LoadPairs, PairMasks};
 use super::order::order_by_key;
 use super::tile_tree::TileTree;
@@ -33,7 +33,7 @@ use contact::SurfaceContact;
 use finding::{Adding, Finding};
 use nearby::NearPoint;
 use nearest::{Feature, Nearest};
-pub(crate) use placed_tile::NearTiles;
+use placed_tile::NearTiles;
 use surface::{Found, Surface, View};
 use touching::{TouchWork, Touching};
 pub(super) use triangle_tiles::SurfaceSearch;
@@ -62,8 +62,10 @@ pub(super) struct SurfaceContacts {
     ordered: Vec<Candidate>,
     /// The candidates whose particle is on its path, and the nearest part of their triangle.
     kept: Gathered<(Candidate, Feature)>,
-    /// What several workers find.
+    /// The nearest points that several workers find.
     points: Gathered<NearPoint>,
+    /// Memory of each worker.
+    near_tiles: Vec<NearTiles>,
     /// The contacts of the running substep, in the order of contact.
     near: Gathered<SurfaceContact>,
     /// Number of torn constraints and their hash, for which the torn triangles were looked up.
@@ -105,6 +107,7 @@ impl SurfaceContacts {
             ordered: Vec::with_capacity(candidate_count_max),
             kept: Gathered::new(candidate_count_max),
             points: Gathered::default(),
+            near_tiles: vec![NearTiles::new()],
             near: Gathered::new(candidate_count_max),
             torn: (0, 0),
         }
@@ -112,9 +115,13 @@ impl SurfaceContacts {
 
     /// Makes room for what each of these workers finds.
     pub(super) fn set_worker_count(&mut self, count: usize) {
+        if !self.are_on() {
+            return;
+        }
         // One worker adds each point as soon as it is found.
         self.points = Gathered::new(if count > 1 { self.candidate_count_max } else { 0 });
         self.points.set_worker_count(count);
+        self.near_tiles.resize_with(count, NearTiles::new);
         self.kept.set_worker_count(count);
         self.near.set_worker_count(count);
     }
@@ -145,18 +152,19 @@ impl SurfaceContacts {
     /// Finds the candidates of strays, and orders all. Breaks if there are too many.
     pub(super) fn find(&mut self, search: &SurfaceSearch<'_>, workers: &mut Workers) -> Search {
         self.tiles.prepare(&self.surface, search, workers);
-        workers.clear_near_tiles();
+        self.near_tiles.iter_mut().for_each(NearTiles::clear);
         self.keep_candidates(search, workers);
-        let Self { surface, tiles, load_pairs, rims, candidates, newest, points, .. } = self;
+        let Self { surface, tiles, load_pairs, rims, candidates, newest, .. } = self;
+        let (points, near_tiles) = (&mut self.points, &mut self.near_tiles);
         let finding = Finding { surface, tiles, load_pairs, rims, search };
         let count_max = self.candidate_count_max;
         let mut adding = Adding { surface, load_pairs, search, candidates, newest, count_max };
-        let found = if workers.count() > 1 && finding.gather(points, workers).is_continue() {
-            points.items.iter().try_for_each(|point| adding.add(*point))
-        } else {
-            let near_tiles = &mut workers.own_scratch().near_tiles;
-            finding.find(&tiles.roots.pairs, near_tiles, &mut |point| adding.add(point))
-        };
+        let found =
+            if workers.count() > 1 && finding.gather(points, near_tiles, workers).is_continue() {
+                points.items.iter().try_for_each(|point| adding.add(*point))
+            } else {
+                finding.find(&tiles.roots.pairs, &mut near_tiles[0], &mut |point| adding.add(point))
+            };
         order_by_key(&self.candidates, &mut self.ordered, |candidate| candidate.key);
         found
     }
@@ -171,7 +179,8 @@ impl SurfaceContacts {
         let (surface, load_pairs) = (&*surface, &*load_pairs);
         kept.items.clear();
         let part_length = workers.part_length(ordered.len(), TOUCH_MIN);
-        let _has_room = kept.extend(workers, (ordered, part_length), |ordered, kept, _| {
+        let (parts, scratches) = ((ordered.as_slice(), part_length), &mut NO_SCRATCHES.clone());
+        let _has_room = kept.extend(workers, parts, scratches, |ordered, kept, ()| {
             let mut on_paths = ordered.iter().filter(|one| !search.tree.is_stray(one.slot));
             on_paths.try_for_each(|candidate| {
                 let view = View { particles: search.states, slot: candidate.slot, time: 0.0 };
@@ -266,7 +275,6 @@ mod tests {
     use super::super::tile::TILE;
     use super::samples::{Random, sheet};
     use super::*;
-    use crate::contacts::contact::ContactRoom;
 
     const SIDE: u32 = 24;
     const SPACING: f32 = 0.02;
@@ -275,9 +283,7 @@ mod tests {
     const PASSED: f32 = 3.0;
 
     fn workers() -> Workers {
-        let mut workers = Workers::new(Kernels::Reference, 1);
-        workers.reserve_contacts(ContactRoom { has_surfaces: true, ..ContactRoom::default() });
-        workers
+        Workers::new(Kernels::Reference, 1)
     }
 
     /// A particle at rest in a rolled sheet whose layers are 25 mm apart, in disorder.

@@ -4,7 +4,7 @@
 //! to load: only the boxes follow the particles.
 
 use super::box_tree::{BoxTree, NodePair, PairSearch, Roots, Search, Within, pair_order};
-use super::gathered::{Gathered, Room, parts};
+use super::gathered::{Gathered, NO_SCRATCHES, Room, parts};
 use super::tile::{TILE, TILE_LENGTH, Tile, coordinates, mark_all, members, take_lowest};
 use crate::contacts::bounds::Bounds;
 use crate::kernels::Kernels;
@@ -141,7 +141,7 @@ impl TileTree {
         self.roots.find(Within(&self.boxes), query.distance, kernels);
         let tree = &*self;
         let roots = parts(&tree.roots.pairs, workers);
-        found.extend(workers, roots, |roots, room, _| {
+        found.extend(workers, roots, &mut NO_SCRATCHES.clone(), |roots, room, ()| {
             tree.search_below(roots, (query, kernels), except, &mut |pair| accept(pair, room))
         })
     }

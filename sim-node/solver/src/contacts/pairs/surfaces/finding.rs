@@ -56,11 +56,16 @@ impl Finding<'_> {
     }
 
     /// Replaces `points` by those that several workers find. Breaks if there are too many.
-    pub(super) fn gather(self, points: &mut Gathered<NearPoint>, workers: &mut Workers) -> Search {
+    pub(super) fn gather(
+        self,
+        points: &mut Gathered<NearPoint>,
+        near_tiles: &mut [NearTiles],
+        workers: &mut Workers,
+    ) -> Search {
         points.items.clear();
         let roots = parts(&self.tiles.roots.pairs, workers);
-        points.extend(workers, roots, |roots, points, scratch| {
-            self.find(roots, &mut scratch.near_tiles, &mut |point| points.add(point))
+        points.extend(workers, roots, near_tiles, |roots, points, near_tiles| {
+            self.find(roots, near_tiles, &mut |point| points.add(point))
         })
     }
 }

@@ -15,7 +15,7 @@ const REMEMBERED: u32 = 64;
 
 /// Memory of a worker for tiles that a search comes to again and again.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct NearTiles {
+pub(super) struct NearTiles {
     /// Tile n is at n modulo [`REMEMBERED`].
     tiles: Vec<NearTile>,
 }
@@ -33,7 +33,7 @@ struct NearTile {
 
 impl NearTiles {
     /// Makes room for tiles.
-    pub(crate) fn new() -> Self {
+    pub(super) fn new() -> Self {
         let none = NearTile {
             index: None,
             has_spheres: false,
@@ -45,7 +45,7 @@ impl NearTiles {
     }
 
     /// Forgets all tiles.
-    pub(crate) fn clear(&mut self) {
+    pub(super) fn clear(&mut self) {
         for tile in &mut self.tiles {
             tile.index = None;
         }
