@@ -6,6 +6,7 @@
 mod avx2;
 pub(crate) mod huge_pages;
 pub(crate) mod lanes;
+pub(crate) mod lent_slice;
 mod portable;
 mod scalar;
 pub(crate) mod stream;

@@ -163,7 +163,7 @@ impl Solver {
     /// Sets the number of threads that step the scene, the calling one included: 1 initially, at most
     /// [`THREADS_MAX`](crate::kernels::worker_pool::THREADS_MAX).
     ///
-    /// The number changes no bit. A small scene uses a single thread. The system may grant fewer
+    /// The number changes no bit. A small scene without contacts uses a single thread. The system may grant fewer
     /// threads; see [`Self::threads`].
     pub fn set_threads(&mut self, threads: usize) {
         if threads != self.store.thread_count() {

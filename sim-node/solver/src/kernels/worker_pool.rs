@@ -118,7 +118,8 @@ impl WorkerPool {
         }
     }
 
-    /// Runs `work` on every part, part `i` on worker `i`, and returns when all parts are done.
+    /// Runs `work` on every part, part `i` on worker `i`, and returns when all parts are done. Parts run side
+    /// by side, so one may wait for a [`Milestone`] of another.
     ///
     /// # Panics
     /// If there are more parts than workers, or if a worker panics.
@@ -153,7 +154,7 @@ impl WorkerPool {
         let result = catch_unwind(AssertUnwindSafe(|| job(0)));
         let mut spins = 0;
         while slot.busy_count.load(Ordering::Acquire) > 0 {
-            slot.back_off(&mut spins);
+            back_off(&mut spins, slot.spins);
         }
         // SAFETY: every worker has finished.
         unsafe { *slot.job.0.get() = None };
@@ -165,16 +166,6 @@ impl WorkerPool {
 }
 
 impl JobSlot {
-    /// Spins at first, then yields the core.
-    fn back_off(&self, spins: &mut u32) {
-        if *spins < self.spins {
-            *spins += 1;
-            spin_loop();
-        } else {
-            thread::yield_now();
-        }
-    }
-
     /// Runs jobs until the pool shuts down.
     fn serve(&self, worker: usize) {
         let mut done_count = 0;
@@ -203,7 +194,7 @@ impl JobSlot {
         let mut spins = 0;
         while !is_announced() {
             if spins < self.spins || is_stepping() {
-                self.back_off(&mut spins);
+                back_off(&mut spins, self.spins);
                 continue;
             }
             let is_parked = &self.is_parked[worker - 1];
@@ -241,6 +232,48 @@ impl Clone for WorkerPool {
 impl fmt::Debug for WorkerPool {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "WorkerPool of {}", self.worker_count())
+    }
+}
+
+/// Spins at first, then yields the core.
+fn back_off(spins: &mut u32, spins_max: u32) {
+    if *spins < spins_max {
+        *spins += 1;
+        spin_loop();
+    } else {
+        thread::yield_now();
+    }
+}
+
+/// A point in the work of one part of a job that another part waits for.
+#[derive(Debug)]
+pub(crate) struct Milestone(AtomicBool);
+
+/// Reaches a milestone when it is dropped. Since a panic drops it as well, nobody waits forever.
+pub(crate) struct OnTheWay<'a>(&'a Milestone);
+
+impl Milestone {
+    pub(crate) const fn new() -> Self {
+        Self(AtomicBool::new(false))
+    }
+
+    /// Everything that this thread does until the result is dropped happens before [`Self::wait`] returns.
+    pub(crate) fn reach_when_dropped(&self) -> OnTheWay<'_> {
+        OnTheWay(self)
+    }
+
+    /// Waits until the other thread has reached it.
+    pub(crate) fn wait(&self) {
+        let mut spins = 0;
+        while !self.0.load(Ordering::Acquire) {
+            back_off(&mut spins, SPINS_CROWDED);
+        }
+    }
+}
+
+impl Drop for OnTheWay<'_> {
+    fn drop(&mut self) {
+        self.0.0.store(true, Ordering::Release);
     }
 }
 
@@ -335,6 +368,23 @@ mod tests {
         while !is_parked(&pool) {
             thread::yield_now();
         }
+    }
+
+    #[test]
+    fn a_panic_releases_the_worker_that_waits_for_a_milestone() {
+        let mut pool = WorkerPool::new(2);
+        let milestone = Milestone::new();
+        let result = catch_unwind(AssertUnwindSafe(|| {
+            pool.for_each(&mut [0, 1], |part| {
+                if *part == 0 {
+                    milestone.wait();
+                } else {
+                    let _on_the_way = milestone.reach_when_dropped();
+                    panic!("on the way");
+                }
+            });
+        }));
+        assert!(result.is_err());
     }
 
     #[test]

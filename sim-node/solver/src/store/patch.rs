@@ -2,28 +2,29 @@
 
 mod band;
 mod band_forces;
+mod bands;
 mod bend_layout;
 mod bends;
 mod measure;
+mod shared_sweep;
 mod sheet_layout;
 pub(crate) mod sheets;
 mod span;
 mod wind;
 
-use std::ops::Range;
-
-use band::{Band, PassSweep, SweepWork};
-use band_forces::BandForces;
+use band::LentRows;
+use band_forces::LentForces;
+use bands::Bands;
 use bend_layout::BendLayout;
-use sheet_layout::{SheetLayout, band_count};
-use span::Span;
+use shared_sweep::SharedSweep;
+use sheet_layout::SheetLayout;
 use wind::SheetWindWork;
 
 use super::layout::Layout;
 use super::publish::{PublishedMotion, publish};
 use super::rows::{RowLayout, RowState, Rows};
 use super::survey::FamilySoftness;
-use super::workers::{WorkerScratch, Workers};
+use super::workers::Workers;
 use crate::constraints::bends::families::BendFamily;
 use crate::constraints::column_writer::{ColumnOrder, ColumnWriter};
 use crate::constraints::families::{Family, Sheet};
@@ -31,6 +32,7 @@ use crate::constraints::fields::Pass;
 use crate::constraints::parameters::ConstraintParameters;
 use crate::kernels::Kernels;
 use crate::kernels::lanes::axes;
+use crate::kernels::lent_slice::LentSlice;
 use crate::state::particles::Particle;
 use crate::step::schedule::{Schedule, ScheduledStage};
 use crate::step::substep::SubstepInputs;
@@ -174,57 +176,30 @@ impl Patch {
     }
 
     /// Runs stages on all rows. Returns true if any constraint was marked as torn.
-    ///
-    /// Each worker has a band of rows. A second round finishes the seams between them, whose
-    /// constraints need rows of two bands.
     fn run_stages(
         &mut self,
         workers: &mut Workers,
         (stages, pass): (&[ScheduledStage], Pass),
         inputs: &SubstepInputs<'_>,
     ) -> bool {
-        let (sheet, pull_masks) = (&self.layout, self.pull_masks.as_slice());
+        let sheet = &self.layout;
         let (layout, numbers, forces) = self.rows.split_mut();
-        let is_measured = forces.is_measured;
-        let kernels = workers.kernels;
         let reach = stages.iter().map(|stage| stage.reach).sum();
-        let count = band_count(layout, workers.count(), reach);
-        let run = |band: Band<'_>, span, scratch: &mut WorkerScratch| {
-            let sweep = PassSweep { stages, pass, inputs, scratch };
-            if is_measured {
-                kernels.run(SweepWork::<true> { band, span, sweep })
-            } else {
-                kernels.run(SweepWork::<false> { band, span, sweep })
-            }
+        let sweep = SharedSweep {
+            bands: Bands::new(layout, workers.count(), reach),
+            kernels: workers.kernels,
+            is_measured: forces.is_measured,
+            rows: LentRows {
+                numbers: LentSlice::new(numbers),
+                layout,
+                sheet,
+                forces: LentForces::new(forces, &self.pull_masks, sheet.pull_groups()),
+            },
+            stages,
+            pass,
+            inputs,
         };
-        if count == 1 {
-            let forces = BandForces::new(forces, pull_masks, sheet.pull_groups());
-            let band = Band { numbers, first: 0, layout, sheet, forces };
-            let span = Span::new(0..layout.rows, layout.rows);
-            return run(band, span, workers.own_scratch());
-        }
-        let cuts = (0..=count).map(|band| band * layout.rows / count);
-        let spans = cuts
-            .clone()
-            .zip(cuts.clone().skip(1))
-            .map(|(first, last)| (first..last, Span::new(first..last, layout.rows)));
-        let seams = cuts.skip(1).take(count - 1);
-        let seams = seams.map(|row| (row - reach..row + reach, Span::seam(row)));
-        let mut is_marked = false;
-        let mut round = |spans: &mut dyn Iterator<Item = (Range<usize>, Span)>| {
-            let work = |part: &mut BandPart<'_>, scratch: &mut WorkerScratch| {
-                if let Some(band) = part.band.take() {
-                    part.is_marked = run(band, part.span.clone(), scratch);
-                }
-            };
-            let forces = BandForces::new(&mut *forces, pull_masks, sheet.pull_groups());
-            let whole = Band { numbers: &mut *numbers, first: 0, layout, sheet, forces };
-            let parts = BandPart::split(whole, spans);
-            workers.for_each(parts, work, |part| is_marked |= part.is_marked);
-        };
-        round(&mut spans.into_iter());
-        round(&mut seams.into_iter());
-        is_marked
+        sweep.run(workers)
     }
 
     /// Writes the state back. Returns the number of particles that froze.
@@ -248,29 +223,5 @@ impl Patch {
     pub(crate) fn blow(&mut self, kernels: Kernels, wind: &WindStep) {
         let (layout, numbers, _) = self.rows.split_mut();
         kernels.run(SheetWindWork { numbers, layout, wind });
-    }
-}
-
-/// Rows that one worker processes.
-struct BandPart<'a> {
-    /// None once they are processed.
-    band: Option<Band<'a>>,
-    span: Span,
-    is_marked: bool,
-}
-
-impl<'a> BandPart<'a> {
-    /// Splits ascending ranges of rows off a sheet.
-    fn split(
-        whole: Band<'a>,
-        spans: impl Iterator<Item = (Range<usize>, Span)>,
-    ) -> impl Iterator<Item = Self> {
-        let mut rest = Some(whole);
-        spans.map_while(move |(rows, span)| {
-            let (_, from) = rest.take()?.split_at(rows.start);
-            let (band, others) = from.split_at(rows.end);
-            rest = Some(others);
-            Some(Self { band: Some(band), span, is_marked: false })
-        })
     }
 }

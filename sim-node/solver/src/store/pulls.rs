@@ -5,9 +5,12 @@
 //! alone. The measured changes are those that the particle really makes, so impulses and momentum agree up to
 //! the rounding of a sum.
 
+use std::ops::Range;
+
 use glam::DVec3;
 
 use crate::kernels::lanes::axes;
+use crate::kernels::lent_slice::LentSlice;
 
 /// A constraint or bend with a fixed particle, measured at a free one.
 #[derive(Debug, Clone, Copy)]
@@ -70,6 +73,11 @@ impl Pulls {
         self.ranges.get(projection).is_some_and(|[first, end]| first < end)
     }
 
+    /// All projections, for threads that take them one after the other.
+    pub(crate) fn lend(&mut self) -> LentPulls<'_> {
+        LentPulls { ranges: &self.ranges, changes: LentSlice::new(&mut self.changes) }
+    }
+
     /// All projections.
     pub(crate) fn whole(&mut self) -> PullsPart<'_> {
         PullsPart { ranges: &self.ranges, changes: &mut self.changes, first: 0 }
@@ -93,6 +101,32 @@ pub(crate) struct PullsPart<'a> {
     changes: &'a mut [Change],
     /// Index of the first pull in `changes`.
     first: usize,
+}
+
+/// The pulls of all projections, parts of which go from thread to thread.
+#[derive(Debug)]
+pub(crate) struct LentPulls<'a> {
+    /// By projection.
+    ranges: &'a [PullRange],
+    changes: LentSlice<'a, Change>,
+}
+
+impl LentPulls<'_> {
+    /// Returns the pulls of some projections.
+    ///
+    /// # Safety
+    /// As for [`LentSlice::part`], with projections as elements.
+    #[allow(unsafe_code, reason = "lends on")]
+    pub(crate) unsafe fn part(&self, projections: Range<usize>) -> PullsPart<'_> {
+        let end = self.ranges.last().map_or(0, |[_, end]| *end as usize);
+        let first = |projection: usize| {
+            self.ranges.get(projection).map_or(end, |[first, _]| *first as usize)
+        };
+        let changes = first(projections.start)..first(projections.end);
+        // SAFETY: no two projections share a change.
+        let part = unsafe { self.changes.part(changes.clone()) };
+        PullsPart { ranges: self.ranges, changes: part, first: changes.start }
+    }
 }
 
 /// The numbers of particles in memory.

@@ -6,7 +6,9 @@
 //! stay in a near cache. Every constraint finds its ends as it would stage by stage, so the bits are
 //! the same.
 
-use super::band_forces::BandForces;
+use std::ops::Range;
+
+use super::band_forces::{BandForces, LentForces};
 use super::bends::project_bends;
 use super::sheet_layout::{FamilyBlock, SheetLayout};
 use super::span::Span;
@@ -17,6 +19,7 @@ use crate::constraints::fields::Pass;
 use crate::constraints::projection::Projection;
 use crate::constraints::projection_block::ProjectionBlock;
 use crate::kernels::lanes::{LaneWork, Wide};
+use crate::kernels::lent_slice::LentSlice;
 use crate::step::particle_stages::run_stage;
 use crate::step::schedule::ScheduledStage;
 use crate::step::stage::Stage;
@@ -55,6 +58,9 @@ pub(crate) struct PassSweep<'a, 'b> {
 pub(crate) struct SweepWork<'a, 'b, 'c, const IS_MEASURED: bool> {
     pub(crate) band: Band<'a>,
     pub(crate) span: Span,
+    /// Rows of the first stage while the wave is in this part of the span. It ends behind the sheet, when the
+    /// last stage has arrived.
+    pub(crate) fronts: Range<usize>,
     pub(crate) sweep: PassSweep<'b, 'c>,
 }
 
@@ -63,18 +69,33 @@ impl<const IS_MEASURED: bool> LaneWork for SweepWork<'_, '_, '_, IS_MEASURED> {
 
     #[inline(always)]
     fn run<W: Wide>(mut self) -> bool {
-        self.band.sweep::<W, IS_MEASURED>(&self.span, &mut self.sweep)
+        self.band.sweep::<W, IS_MEASURED>((&self.span, &self.fronts), &mut self.sweep)
     }
 }
 
-impl<'a> Band<'a> {
-    /// Splits before a row.
-    pub(crate) fn split_at(self, row: usize) -> (Band<'a>, Band<'a>) {
-        let Self { numbers, first, layout, sheet, forces } = self;
-        let (numbers, others) = numbers.split_at_mut((row - first) * layout.length);
-        let (forces, other_forces) = forces.split_at(row);
-        let other = Band { numbers: others, first: row, layout, sheet, forces: other_forces };
-        (Band { numbers, first, layout, sheet, forces }, other)
+/// All rows of a sheet, which threads take in turns.
+pub(crate) struct LentRows<'a> {
+    pub(crate) numbers: LentSlice<'a, f32>,
+    pub(crate) layout: &'a RowLayout,
+    pub(crate) sheet: &'a SheetLayout,
+    pub(crate) forces: LentForces<'a>,
+}
+
+impl LentRows<'_> {
+    /// Returns some rows.
+    ///
+    /// # Safety
+    /// As for [`LentSlice::part`], with rows as elements.
+    #[allow(unsafe_code, reason = "lends on")]
+    pub(crate) unsafe fn band(&self, rows: Range<usize>) -> Band<'_> {
+        let Self { layout, sheet, .. } = *self;
+        let first = rows.start;
+        let numbers = first * layout.length..rows.end * layout.length;
+        // SAFETY: the caller has these rows.
+        let numbers = unsafe { self.numbers.part(numbers) };
+        // SAFETY: as above.
+        let forces = unsafe { self.forces.rows(rows) };
+        Band { numbers, first, layout, sheet, forces }
     }
 }
 
@@ -82,7 +103,7 @@ impl Band<'_> {
     #[inline(always)]
     fn sweep<W: Wide, const IS_MEASURED: bool>(
         &mut self,
-        span: &Span,
+        (span, fronts): (&Span, &Range<usize>),
         sweep: &mut PassSweep<'_, '_>,
     ) -> bool {
         let stages = sweep.stages;
@@ -96,7 +117,7 @@ impl Band<'_> {
             }
         }
         let mut is_marked = false;
-        for front in first..last {
+        for front in first.max(fronts.start)..last.min(fronts.end) {
             if sweep.inputs.is_given_up() {
                 break;
             }

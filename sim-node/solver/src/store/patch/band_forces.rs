@@ -1,7 +1,10 @@
 //! Forces of the particles of some rows on colliders and fixed particles.
 
+use std::ops::Range;
+
 use crate::contacts::contact::reaction::BlockReaction;
-use crate::store::pulls::PullsPart;
+use crate::kernels::lent_slice::LentSlice;
+use crate::store::pulls::{LentPulls, PullsPart};
 use crate::store::rows::RowForces;
 use crate::store::rows::particles::TetherPulls;
 
@@ -23,8 +26,24 @@ pub(crate) struct BandForces<'a> {
     tether_pulls: &'a mut [TetherPulls],
 }
 
-impl<'a> BandForces<'a> {
-    /// All rows. `pull_masks` is empty while nobody asks for forces.
+/// The forces of all rows, parts of which go from thread to thread.
+#[derive(Debug)]
+pub(crate) struct LentForces<'a> {
+    /// By row: bit n is set if its projection n has pulls.
+    pull_masks: &'a [u32],
+    /// Number of projections in a row.
+    pull_groups: usize,
+    /// Number of reactions of a row.
+    reaction_count: usize,
+    /// Number of tether pulls of a row.
+    tether_length: usize,
+    pulls: LentPulls<'a>,
+    reactions: LentSlice<'a, BlockReaction>,
+    tether_pulls: LentSlice<'a, TetherPulls>,
+}
+
+impl<'a> LentForces<'a> {
+    /// `pull_masks` is empty while nobody asks for forces.
     pub(crate) fn new(
         forces: &'a mut RowForces,
         pull_masks: &'a [u32],
@@ -33,27 +52,32 @@ impl<'a> BandForces<'a> {
         let RowForces { pulls, reactions, reaction_count, tether_pulls, tether_length, .. } =
             forces;
         Self {
-            first: 0,
             pull_masks,
             pull_groups,
             reaction_count: *reaction_count,
             tether_length: *tether_length,
-            pulls: pulls.whole(),
-            reactions,
-            tether_pulls,
+            pulls: pulls.lend(),
+            reactions: LentSlice::new(reactions),
+            tether_pulls: LentSlice::new(tether_pulls),
         }
     }
 
-    /// Splits before a row.
-    pub(crate) fn split_at(self, row: usize) -> (BandForces<'a>, BandForces<'a>) {
-        let Self { first, pull_masks, pull_groups, reaction_count, tether_length, .. } = self;
-        let count = row - first;
-        let (pulls, other_pulls) = self.pulls.split_at(row * pull_groups);
-        let (reactions, other_reactions) = self.reactions.split_at_mut(count * reaction_count);
-        let (tether_pulls, other_tether_pulls) =
-            self.tether_pulls.split_at_mut(count * tether_length);
-        let part = |first, pulls, reactions, tether_pulls| BandForces {
-            first,
+    /// Returns the forces of some rows.
+    ///
+    /// # Safety
+    /// As for [`LentSlice::part`], with rows as elements.
+    #[allow(unsafe_code, reason = "lends on")]
+    pub(crate) unsafe fn rows(&self, rows: Range<usize>) -> BandForces<'_> {
+        let Self { pull_masks, pull_groups, reaction_count, tether_length, .. } = *self;
+        let of_rows = |count: usize| rows.start * count..rows.end * count;
+        // SAFETY: no two rows share a projection, and the caller has these rows.
+        let pulls = unsafe { self.pulls.part(of_rows(pull_groups)) };
+        // SAFETY: as above.
+        let reactions = unsafe { self.reactions.part(of_rows(reaction_count)) };
+        // SAFETY: as above.
+        let tether_pulls = unsafe { self.tether_pulls.part(of_rows(tether_length)) };
+        BandForces {
+            first: rows.start,
             pull_masks,
             pull_groups,
             reaction_count,
@@ -61,11 +85,11 @@ impl<'a> BandForces<'a> {
             pulls,
             reactions,
             tether_pulls,
-        };
-        let before = part(first, pulls, reactions, tether_pulls);
-        (before, part(row, other_pulls, other_reactions, other_tether_pulls))
+        }
     }
+}
 
+impl BandForces<'_> {
     /// Number of a projection: group `group` of a row.
     #[inline(always)]
     pub(crate) fn projection(&self, row: usize, group: usize) -> usize {

@@ -7,9 +7,6 @@ use crate::constraints::parameters::PassSoftness;
 use crate::store::layout::Layout;
 use crate::store::rows::{LINE_LENGTH, RowLayout};
 
-/// Number of particles in a sheet from which on several threads are faster than one.
-const SHARED_MIN: usize = 4000;
-
 /// The constraints that begin in a row, behind its particles: family by family, then the bends.
 #[derive(Debug, Clone)]
 pub(crate) struct SheetLayout {
@@ -102,15 +99,6 @@ impl SheetLayout {
             + family_index * self.bends.family_length
             + group.place(column, rows.columns, rows.stride)
     }
-}
-
-/// Number of bands into which the rows of a sheet are divided, each high enough that its seams are a small part
-/// of it.
-pub(crate) fn band_count(layout: &RowLayout, workers: usize, reach: usize) -> usize {
-    if layout.rows * layout.columns < SHARED_MIN {
-        return 1;
-    }
-    workers.min(layout.rows / (4 * reach + 1)).max(1)
 }
 
 /// Position in its field of a constraint within a row. Its half begins at 0 or in the middle.
