@@ -3,3 +3,4 @@
 pub(crate) mod graphs;
 pub(crate) mod mesh;
 pub(crate) mod sheet;
+pub(crate) mod touching;

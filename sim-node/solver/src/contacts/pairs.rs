@@ -14,13 +14,14 @@ mod load;
 mod loading;
 pub(crate) mod order;
 mod pair;
+mod pair_batch;
 mod push;
 mod surfaces;
 mod tile;
 mod tile_tree;
 
 use box_tree::Search;
-use gathered::{Gathered, NO_SCRATCHES, Room};
+use gathered::{Gathered, Room};
 pub(crate) use load::CONNECTED_REACH;
 use load::{LaneMasks, LoadPairs};
 use loading::load_states;
@@ -214,15 +215,14 @@ impl ParticleContacts {
         let Self { states, ordered, near, surfaces, thickness, .. } = self;
         near.items.clear();
         let part_length = workers.part_length(ordered.len(), NEAR_MIN);
-        let (parts, scratches) = ((ordered.as_slice(), part_length), &mut NO_SCRATCHES.clone());
-        let _has_room = near.extend(workers, parts, scratches, |pairs, near, ()| {
+        near.filter(workers, ordered.chunks(part_length), |pairs, near| {
             let mut pairs = pairs.iter().filter(|pair| pair.is_near(states, REACH));
             pairs.try_for_each(|pair| near.add(*pair))
         });
         for pair in &near.items {
             pair.push_apart(states, friction);
         }
-        surfaces.push_apart(states, (*thickness, REACH), (friction, workers));
+        surfaces.push_apart(states, (*thickness, REACH), friction, workers);
         self.touched.fill(0);
         let slots = near.items.iter().flat_map(|pair| pair.slots);
         mark(&mut self.touched, slots.chain(surfaces.touched()));

@@ -8,9 +8,10 @@
 use std::cell::{Cell, UnsafeCell};
 use std::fmt;
 use std::hint::spin_loop;
+use std::num::NonZero;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Arc, LazyLock};
 use std::thread::{self, JoinHandle};
 
 /// Largest number of threads that step a solver.
@@ -20,10 +21,15 @@ pub const THREADS_MAX: u8 = 64;
 pub(crate) const WORKERS_MAX: usize = THREADS_MAX as usize;
 
 /// Checks for a job before a worker yields or, between steps, parks: 20 to 100 microseconds, depending on how long the
-/// processor pauses between two of them. To wake a parked worker takes as long.
+/// processor pauses between two of them. Waking a parked worker takes as long.
 const SPINS: u32 = 1 << 11;
 /// The same number if there are more workers than processors: another worker needs the processor.
 const SPINS_CROWDED: u32 = 1 << 6;
+
+/// Number of processors of the process. It is read when the first pool is made: later, the calling thread may be bound to
+/// one of them, or to the others.
+static PROCESSORS: LazyLock<usize> =
+    LazyLock::new(|| thread::available_parallelism().map_or(1, NonZero::get));
 
 /// A job, called with the index of the worker.
 type Job<'a> = dyn Fn(usize) + Sync + 'a;
@@ -47,7 +53,7 @@ struct JobSlot {
     /// Workers that have not finished it.
     busy_count: AtomicUsize,
     has_panicked: AtomicBool,
-    /// A step runs that may have jobs, so workers do not park.
+    /// A step that may have jobs is running, so workers do not park.
     is_stepping: AtomicBool,
     is_shut_down: AtomicBool,
     /// By worker, without the first: it is parked, or about to park.
@@ -68,8 +74,7 @@ impl WorkerPool {
     /// if the system refuses a thread.
     pub(crate) fn new(workers: usize) -> Self {
         let others = workers.clamp(1, WORKERS_MAX) - 1;
-        let is_crowded =
-            thread::available_parallelism().is_ok_and(|processors| others >= processors.get());
+        let is_crowded = others >= *PROCESSORS;
         let slot = Arc::new(JobSlot {
             job_count: AtomicU64::new(0),
             job: JobCell(UnsafeCell::new(None)),
@@ -93,8 +98,8 @@ impl WorkerPool {
         self.others.len() + 1
     }
 
-    /// Wakes the workers, and lets them wait for jobs without parking, if the step before had any and each worker can have a
-    /// processor.
+    /// Wakes the workers and keeps them awake until [`Self::end_step`]. Does nothing if the step before had no jobs, or
+    /// if there are more workers than processors.
     pub(crate) fn begin_step(&mut self) {
         let job_count = self.slot.job_count.load(Ordering::Relaxed);
         let had_jobs = std::mem::replace(&mut self.jobs_before, job_count) != job_count;
@@ -158,10 +163,14 @@ impl WorkerPool {
         }
         // SAFETY: every worker has finished.
         unsafe { *slot.job.0.get() = None };
+        let has_panicked = slot.has_panicked.load(Ordering::Relaxed);
+        if has_panicked || result.is_err() {
+            self.end_step();
+        }
         if let Err(panic) = result {
             std::panic::resume_unwind(panic);
         }
-        assert!(!slot.has_panicked.load(Ordering::Relaxed), "a thread of the solver has panicked");
+        assert!(!has_panicked, "a thread of the solver has panicked");
     }
 }
 
@@ -345,7 +354,7 @@ mod tests {
     }
 
     #[test]
-    fn workers_stay_awake_in_a_step_after_one_with_jobs() {
+    fn workers_wake_for_a_step_after_one_with_jobs_and_park_behind_it() {
         let mut pool = WorkerPool::new(2);
         pool.is_crowded = false;
         let is_parked = |pool: &WorkerPool| pool.slot.is_parked[0].load(Ordering::SeqCst);

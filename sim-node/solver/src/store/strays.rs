@@ -124,7 +124,7 @@ impl<'a> ComparedGraph<'a> {
 /// The marks of strays: entry i has the bits of the slots 16 i to 16 i + 15.
 pub(crate) struct StrayMarks<'a> {
     pub(crate) all: &'a mut [u16],
-    /// By worker, without the first: its own marks. No bit is set before and after.
+    /// By worker, without the first: its own marks. All bits are clear between calls.
     pub(crate) of_others: &'a mut [Vec<u16>],
 }
 

@@ -14,7 +14,7 @@ pub(crate) struct Workers {
     scratches: Vec<WorkerScratch>,
 }
 
-/// Scratch memory of one worker, in cache lines of its own, because each writes its own all the time.
+/// Scratch memory of one worker, in cache lines of its own, because each worker writes its own constantly.
 #[derive(Debug, Clone, Default)]
 #[repr(align(128))]
 pub(crate) struct WorkerScratch {
@@ -44,7 +44,7 @@ impl Workers {
         self.pool.end_step();
     }
 
-    /// Number of items in each part if these many are divided among the workers. No part but the last one is shorter
+    /// Number of items per part when `count` items are divided among the workers. No part but the last one is shorter
     /// than `min`, because a worker needs a microsecond to begin.
     pub(crate) fn part_length(&self, count: usize, min: usize) -> usize {
         count.div_ceil(self.count()).max(min)

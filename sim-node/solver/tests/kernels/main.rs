@@ -353,6 +353,30 @@ fn threads_give_the_same_bits_where_cloths_touch() {
     }
 }
 
+/// Sheets fall on each other, with contacts at several times their spacing: more candidates than there is room for.
+#[test]
+fn threads_give_the_same_bits_where_contacts_are_left_out() {
+    for (mode, spacing) in [("particles", 0.012), ("surfaces", 0.005)] {
+        let mut text = format!(
+            "version = 1\n[solver]\nrate_hz = 60\nsubsteps = 4\n[contact]\nmode = \"{mode}\"\n\
+             thickness = 0.02\n[[collider]]\nshape = \"plane\"\nnormal = [0, 1, 0]\noffset = 0\n"
+        );
+        for sheet in 0..16 {
+            let height = 0.03 + spacing * f64::from(sheet);
+            text += &format!(
+                "[[generate]]\nshape = \"cloth\"\ncolumns = 12\nrows = 12\nspacing = 0.01\n\
+                 pinned = \"none\"\nmass = 0.001\norigin = [0.001, {height}, 0]\n\
+                 right = [1, 0, 0]\ndown = [0, 0.01, 1]\n"
+            );
+        }
+        assert_same_bits_of_threads(&text, mode, 4);
+        let mut solver = Solver::new(&Scene::from_toml(&text, mode).unwrap());
+        solver.set_threads(2);
+        (0..4).for_each(|_| solver.step());
+        assert!(solver.contact_overflow_count() > 0, "{mode}: all candidates had room");
+    }
+}
+
 #[test]
 fn threads_give_the_same_bits_on_large_sheets() {
     for (name, solver, generator) in VARIANTS {

@@ -1,13 +1,12 @@
 //! Cost of contacts: the same sheet without them, with those of particles, and with those of surfaces.
 
-use std::fmt::Write;
-
 use serde::Serialize;
 use sim_solver::{Scene, Solver};
 
 use crate::measures::clock::wall_ns;
 use crate::options::Options;
 use crate::report::{Report, Row};
+use crate::scenes::touching::{TouchingSheet, ball, ground};
 
 /// Distance of neighbours in m, which is also the contact distance.
 const SPACING: f64 = 0.02;
@@ -70,30 +69,16 @@ const FALLS: [Fall; 3] = [
 impl Fall {
     fn scene(&self, (rate_hz, substeps): (u32, u32), mode: &str) -> Scene {
         let length = f64::from(self.side - 1) * SPACING;
-        let ground =
-            "[[collider]]\nshape = \"plane\"\nnormal = [0, 1, 0]\noffset = 0.01\nfriction = 0.3\n";
+        let above = [-length / 2.0, 0.5, -length / 2.0];
+        let ground = ground(0.01);
         let (origin, right, down, colliders) = match self.name {
-            "heap" => {
-                ([0.0, length + 0.01, 0.0], "[1, 0, 0.01]", "[0.02, -1, 0.01]", ground.to_owned())
-            }
-            name => {
-                let ball = "[[collider]]\nshape = \"sphere\"\ncenter = [0, 0.15, 0]\nradius = 0.16\nfriction = 0.3\n";
-                let colliders =
-                    if name == "ball" { format!("{ball}{ground}") } else { String::new() };
-                ([-length / 2.0, 0.5, -length / 2.0], "[1, 0, 0]", "[0, 0, 1]", colliders)
-            }
+            "heap" => ([0.0, length + 0.01, 0.0], [1.0, 0.0, 0.01], [0.02, -1.0, 0.01], ground),
+            "ball" => (above, [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], ball(0.15, 0.16) + &ground),
+            _ => (above, [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], String::new()),
         };
-        let mut text = format!(
-            "version = 1\n[solver]\nrate_hz = {rate_hz}\nsubsteps = {substeps}\n[contact]\nmode = \"{mode}\"\n"
-        );
-        write!(
-            text,
-            "[[generate]]\nshape = \"mesh\"\ncolumns = {side}\nrows = {side}\nspacing = {SPACING}\nmass = 0.001\n\
-             compliance = {{ bend = 1e-3 }}\norigin = {origin:?}\nright = {right}\ndown = {down}\n{colliders}",
-            side = self.side
-        )
-        .unwrap();
-        Scene::from_toml(&text, "bench").unwrap()
+        let (side, spacing) = (self.side, SPACING);
+        TouchingSheet { rate_hz, substeps, mode, side, spacing, origin, right, down, colliders }
+            .scene()
     }
 }
 

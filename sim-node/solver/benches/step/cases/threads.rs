@@ -7,6 +7,7 @@ use crate::measures::clock::{tenth_percentile, wall_ns};
 use crate::options::Options;
 use crate::report::{Report, Row};
 use crate::scenes::sheet::Sheet;
+use crate::scenes::touching::{TouchingSheet, ball, ground};
 
 /// Side of the sheet, substeps, and turns.
 const SHEETS: [(u32, u32, usize); 4] = [(32, 16, 60), (100, 16, 30), (316, 8, 8), (1000, 4, 2)];
@@ -72,22 +73,22 @@ pub(crate) fn run(options: &Options, report: &mut Report) {
 }
 
 /// A sheet that falls on a ball and folds, 60 x 16 substeps a second.
-fn falling(columns: u32, mode: &str) -> Scene {
+fn falling(side: u32, mode: &str) -> Scene {
     let spacing = 0.02;
-    let half = spacing * f64::from(columns - 1) / 2.0;
+    let half = spacing * f64::from(side - 1) / 2.0;
     let radius = half / 4.0;
-    let text = format!(
-        "version = 1\n[solver]\nrate_hz = 60\nsubsteps = 16\n[contact]\nmode = \"{mode}\"\n\
-         [[generate]]\nshape = \"mesh\"\ncolumns = {columns}\nrows = {columns}\nspacing = {spacing}\n\
-         mass = 0.001\ncompliance = {{ bend = 1e-3 }}\norigin = [{}, {}, {}]\nright = [1, 0, 0]\n\
-         down = [0, 0, 1]\n[[collider]]\nshape = \"sphere\"\ncenter = [0, {radius}, 0]\n\
-         radius = {radius}\nfriction = 0.3\n\
-         [[collider]]\nshape = \"plane\"\nnormal = [0, 1, 0]\noffset = 0\nfriction = 0.3\n",
-        -half,
-        2.1 * radius,
-        -half
-    );
-    Scene::from_toml(&text, "threads").unwrap()
+    let sheet = TouchingSheet {
+        rate_hz: 60,
+        substeps: 16,
+        mode,
+        side,
+        spacing,
+        origin: [-half, 2.1 * radius, -half],
+        right: [1.0, 0.0, 0.0],
+        down: [0.0, 0.0, 1.0],
+        colliders: ball(radius, radius) + &ground(0.0),
+    };
+    sheet.scene()
 }
 
 /// Measures in turns, so that disturbances affect both alike.

@@ -140,22 +140,22 @@ pub(super) struct Between<'a>(pub(super) [&'a BoxTree; 2]);
 
 /// Pairs of nodes that together hold all pairs of leaves that a search finds, in the order of [`pair_order`].
 #[derive(Debug, Clone)]
-pub(super) struct Roots {
+pub(super) struct SearchRoots {
     pub(super) pairs: Vec<NodePair>,
     spare: Vec<NodePair>,
 }
 
-/// Number of pairs from which on [`Roots`] are not divided further.
+/// Number of pairs from which on [`SearchRoots`] are not divided further.
 const ROOTS_WANTED: usize = 128;
 
-impl Default for Roots {
+impl Default for SearchRoots {
     fn default() -> Self {
         let room = || Vec::with_capacity(ARITY * ARITY * ROOTS_WANTED);
         Self { pairs: room(), spare: room() }
     }
 }
 
-impl Roots {
+impl SearchRoots {
     /// Replaces the pairs by those of a search, with a small part of it below each.
     pub(super) fn find(&mut self, nesting: impl Nesting, distance: f32, kernels: Kernels) {
         self.pairs.clear();
@@ -167,7 +167,7 @@ impl Roots {
 struct Division<'a, N> {
     nesting: N,
     distance: f32,
-    roots: &'a mut Roots,
+    roots: &'a mut SearchRoots,
 }
 
 impl<N: Nesting> LaneWork for Division<'_, N> {
@@ -175,7 +175,7 @@ impl<N: Nesting> LaneWork for Division<'_, N> {
 
     #[inline(always)]
     fn run<W: Wide>(self) {
-        let Self { nesting, distance, roots: Roots { pairs, spare } } = self;
+        let Self { nesting, distance, roots: SearchRoots { pairs, spare } } = self;
         let mut stack = Stack::default();
         // All pairs lie at the same levels.
         while pairs.len() < ROOTS_WANTED && pairs.first().is_some_and(|pair| !are_leaves(*pair)) {
@@ -352,7 +352,7 @@ mod tests {
 
     /// Searches below each of the roots alone.
     fn found(nesting: impl Nesting, distance: f32, kernels: Kernels) -> Vec<[u32; 2]> {
-        let (mut roots, mut pairs) = (Roots::default(), Vec::new());
+        let (mut roots, mut pairs) = (SearchRoots::default(), Vec::new());
         roots.find(nesting, distance, kernels);
         for root in &roots.pairs {
             let accept = &mut |pair| {

@@ -4,19 +4,17 @@ use super::box_tree::Search;
 use crate::kernels::worker_pool::WORKERS_MAX;
 use crate::store::workers::Workers;
 
-/// Number of parts for each worker where some parts take longer than others.
+/// Number of parts for each worker of a search, since some parts take longer than others.
 const PARTS_PER_WORKER: usize = 8;
 
-/// Items for which each worker has room at least: as many as its part of a short list has.
+/// Fewest roots in a part of a search: a worker needs a microsecond to begin.
+const ROOTS_MIN: usize = 4;
+
+/// Smallest capacity of a share: what a worker examines of a short list.
 const SHARE_MIN: usize = 512;
 
 /// Scratch memory of workers that need none.
 pub(super) const NO_SCRATCHES: [(); WORKERS_MAX] = [(); WORKERS_MAX];
-
-/// Divides items whose work differs into parts of this length, of which each worker does several.
-pub(super) fn parts<'a, P>(all: &'a [P], workers: &Workers) -> (&'a [P], usize) {
-    (all, all.len().div_ceil(PARTS_PER_WORKER * workers.count()).max(1))
-}
 
 /// Items that the workers find, in the order in which one worker would find them.
 #[derive(Debug, Clone)]
@@ -27,8 +25,9 @@ pub(super) struct Gathered<T> {
     shares: Vec<Share<T>>,
 }
 
-/// The items of one worker.
+/// The items of one worker, in cache lines of its own, because each worker writes its own constantly.
 #[derive(Debug, Clone)]
+#[repr(align(128))]
 struct Share<T> {
     items: Vec<T>,
     count_max: usize,
@@ -68,7 +67,7 @@ impl<T> Gathered<T> {
         Self { items: Vec::with_capacity(count_max), count_max, shares: Vec::new() }
     }
 
-    /// Makes room for what each of these workers finds: twice its share, if all find equally much.
+    /// Makes room for what each of these workers finds: twice an equal share.
     pub(super) fn set_worker_count(&mut self, count: usize) {
         self.shares.clear();
         if count > 1 {
@@ -84,68 +83,84 @@ impl<T> Gathered<T> {
 }
 
 impl<T: Copy + Send> Gathered<T> {
-    /// Lets the workers add what they find in the parts of `all`, each of this length, and appends it in the order of the
-    /// parts. Breaks, with the first items that have room, if there are too many. If a worker has no room for its share, one
-    /// worker finds all, so nothing depends on the number of workers. Each worker has a scratch memory, the calling one
-    /// the first.
+    /// Appends what the workers find below the roots of a search, in the order of the roots. Breaks, with the first items
+    /// that have room, if there are too many. If a worker has no room for its share, one worker finds all, so nothing depends
+    /// on the number of workers. Each worker has a scratch memory, the calling one the first.
     ///
     /// # Panics
-    /// If there are more than [`PARTS_PER_WORKER`] parts for each worker, or no scratch memory for one.
-    pub(super) fn extend<P: Sync, S: Send>(
+    /// If there is no scratch memory for a worker.
+    pub(super) fn extend<R: Sync, S: Send>(
         &mut self,
         workers: &mut Workers,
-        (all, part_length): (&[P], usize),
+        roots: &[R],
         scratches: &mut [S],
-        find: impl Fn(&[P], &mut Room<'_, T>, &mut S) -> Search + Sync,
+        find: impl Fn(&[R], &mut Room<'_, T>, &mut S) -> Search + Sync,
     ) -> Search {
-        let Self { items, count_max, shares } = self;
-        let part_count = all.len().div_ceil(part_length);
-        let worker_count = shares.len().min(workers.count()).min(part_count);
+        let gathered = self.try_extend(workers, roots, scratches, &find);
+        gathered.unwrap_or_else(|| find(roots, &mut self.room(), &mut scratches[0]))
+    }
+
+    /// The same, but returns None, with no items more than before, if a worker has no room for its share.
+    pub(super) fn try_extend<R: Sync, S: Send>(
+        &mut self,
+        workers: &mut Workers,
+        roots: &[R],
+        scratches: &mut [S],
+        find: impl Fn(&[R], &mut Room<'_, T>, &mut S) -> Search + Sync,
+    ) -> Option<Search> {
+        let part_length = roots.len().div_ceil(PARTS_PER_WORKER * workers.count()).max(ROOTS_MIN);
+        let part_count = roots.len().div_ceil(part_length);
+        let worker_count = self.shares.len().min(workers.count()).min(part_count);
         if worker_count <= 1 {
-            return find(all, &mut Room { items, count_max: *count_max }, &mut scratches[0]);
+            return Some(find(roots, &mut self.room(), &mut scratches[0]));
         }
-        assert!(part_count <= PARTS_PER_WORKER * worker_count, "too many parts");
+        let shares = &mut self.shares[..worker_count];
         workers.for_each(
-            shares[..worker_count].iter_mut().zip(&mut *scratches).enumerate(),
+            shares.iter_mut().zip(&mut *scratches).enumerate(),
             |(worker, (share, scratch)), _| {
                 share.clear();
                 // Neighbouring parts, which often take equally long, go to different workers.
-                for part in all.chunks(part_length).skip(*worker).step_by(worker_count) {
+                for part in roots.chunks(part_length).skip(*worker).step_by(worker_count) {
                     share.add(|room| find(part, room, scratch));
                 }
             },
             |_| {},
         );
-        if shares[..worker_count].iter().any(|share| share.is_full) {
-            return find(all, &mut Room { items, count_max: *count_max }, &mut scratches[0]);
-        }
-        self.join(part_count, worker_count)
+        let is_one_full = shares.iter().any(|share| share.is_full);
+        (!is_one_full).then(|| self.join(part_count, worker_count))
     }
 
-    /// The same for items that the workers change. Each has one part, of at least `length_min` items, and finds at most one
-    /// for each of them.
-    pub(super) fn extend_from<P: Send>(
+    /// Appends what `find` makes of parts of a list, each by one worker: at most one item for each item of the list.
+    ///
+    /// # Panics
+    /// If there are more parts than workers, or too many items.
+    pub(super) fn filter<P: Send>(
         &mut self,
         workers: &mut Workers,
-        (all, length_min): (&mut [P], usize),
-        find: impl Fn(&mut [P], &mut Room<'_, T>) -> Search + Sync,
-    ) -> Search {
-        let Self { items, count_max, shares } = self;
-        let part_length = workers.part_length(all.len(), length_min);
-        let part_count = all.len().div_ceil(part_length);
-        if part_count.min(shares.len()) <= 1 {
-            return find(all, &mut Room { items, count_max: *count_max });
-        }
-        workers.for_each(
-            shares.iter_mut().zip(all.chunks_mut(part_length)),
-            |(share, part), _| {
-                share.clear();
-                share.add(|room| find(part, room));
-            },
-            |_| {},
-        );
-        assert!(shares[..part_count].iter().all(|share| !share.is_full), "too many items");
-        self.join(part_count, part_count)
+        mut parts: impl ExactSizeIterator<Item = P>,
+        find: impl Fn(&mut P, &mut Room<'_, T>) -> Search + Sync,
+    ) {
+        let count = parts.len();
+        let end = if count > 1 {
+            assert!(count <= self.shares.len(), "more parts than workers");
+            workers.for_each(
+                self.shares.iter_mut().zip(parts),
+                |(share, part), _| {
+                    share.clear();
+                    share.add(|room| find(part, room));
+                    assert!(!share.is_full, "too many items in a part");
+                },
+                |_| {},
+            );
+            self.join(count, count)
+        } else {
+            parts.try_for_each(|mut part| find(&mut part, &mut self.room()))
+        };
+        assert!(end.is_continue(), "too many items");
+    }
+
+    fn room(&mut self) -> Room<'_, T> {
+        Room { items: &mut self.items, count_max: self.count_max }
     }
 
     /// Appends what the workers have found, part by part.
@@ -195,17 +210,16 @@ mod tests {
         worker_count: usize,
         condition: impl Fn(u32) -> bool + Sync,
     ) -> (Vec<u32>, bool) {
-        let all: Vec<u32> = (0..10_000).collect();
+        let roots: Vec<u32> = (0..10_000).collect();
         let mut workers = Workers::new(Kernels::Reference, worker_count);
         let mut found = Gathered::new(count_max);
         found.set_worker_count(worker_count);
         found.items.push(7);
-        let parts = parts(&all, &workers);
-        let end =
-            found.extend(&mut workers, parts, &mut NO_SCRATCHES.clone(), |part, found, ()| {
-                let mut wanted = part.iter().copied().filter(|one| condition(*one));
-                wanted.try_for_each(|one| found.add(one))
-            });
+        let scratches = &mut NO_SCRATCHES.clone();
+        let end = found.extend(&mut workers, &roots, scratches, |part, found, ()| {
+            let mut wanted = part.iter().copied().filter(|one| condition(*one));
+            wanted.try_for_each(|one| found.add(one))
+        });
         (found.items, end.is_break())
     }
 
@@ -237,20 +251,19 @@ mod tests {
         for worker_count in [1, 2, 3, 8] {
             let mut all: Vec<u32> = (0..100).collect();
             let mut workers = Workers::new(Kernels::Reference, worker_count);
-            let mut found = Gathered::new(60);
+            let mut found = Gathered::new(50);
             found.set_worker_count(worker_count);
             let work = |one: &mut u32, found: &mut Room<'_, u32>| {
                 *one += 1;
                 if one.is_multiple_of(2) { found.add(*one) } else { Search::Continue(()) }
             };
-            let end = found.extend_from(&mut workers, (&mut all, 4), |part, found| {
+            let parts = all.chunks_mut(100_usize.div_ceil(worker_count));
+            found.filter(&mut workers, parts, |part, found| {
                 part.iter_mut().try_for_each(|one| work(one, found))
             });
-            assert!(end.is_continue() && all.iter().copied().eq(1..=100), "{worker_count}");
-            assert!(
-                found.items.iter().copied().eq((1..=50).map(|half| 2 * half)),
-                "{worker_count}"
-            );
+            assert!(all.iter().copied().eq(1..=100), "{worker_count}");
+            let evens = (1..=50).map(|half| 2 * half);
+            assert!(found.items.iter().copied().eq(evens), "{worker_count}");
         }
     }
 }

@@ -8,6 +8,7 @@ mod candidate;
 mod contact;
 mod faces;
 mod finding;
+mod near_tiles;
 mod nearby;
 mod nearest;
 mod placed_tile;
@@ -19,7 +20,7 @@ mod triangle_tile;
 mod triangle_tiles;
 
 use super::box_tree::Search;
-use super::gathered::{Gathered, NO_SCRATCHES};
+use super::gathered::Gathered;
 use super::load::{self, LoadPairs, PairMasks};
 use super::order::order_by_key;
 use super::tile_tree::TileTree;
@@ -31,9 +32,9 @@ use crate::store::workers::Workers;
 use candidate::{Candidate, add_candidate, has_candidate};
 use contact::SurfaceContact;
 use finding::{Adding, Finding};
+use near_tiles::NearTiles;
 use nearby::NearPoint;
 use nearest::{Feature, Nearest};
-use placed_tile::NearTiles;
 use surface::{Found, Surface, View};
 use touching::{TouchWork, Touching};
 pub(super) use triangle_tiles::SurfaceSearch;
@@ -179,8 +180,7 @@ impl SurfaceContacts {
         let (surface, load_pairs) = (&*surface, &*load_pairs);
         kept.items.clear();
         let part_length = workers.part_length(ordered.len(), TOUCH_MIN);
-        let (parts, scratches) = ((ordered.as_slice(), part_length), &mut NO_SCRATCHES.clone());
-        let _has_room = kept.extend(workers, parts, scratches, |ordered, kept, ()| {
+        kept.filter(workers, ordered.chunks(part_length), |ordered, kept| {
             let mut on_paths = ordered.iter().filter(|one| !search.tree.is_stray(one.slot));
             on_paths.try_for_each(|candidate| {
                 let view = View { particles: search.states, slot: candidate.slot, time: 0.0 };
@@ -206,13 +206,16 @@ impl SurfaceContacts {
         &mut self,
         states: &mut [PackedParticle],
         (thickness, reach): (f32, f32),
-        (friction, workers): (f32, &mut Workers),
+        friction: f32,
+        workers: &mut Workers,
     ) {
         let Self { surface, load_pairs, ordered, near, .. } = self;
         near.items.clear();
         let touching = Touching { surface, load_pairs, states, thickness, reach };
         let kernels = workers.kernels;
-        let _has_room = near.extend_from(workers, (ordered, TOUCH_MIN), |candidates, near| {
+        // Eight candidates at once, with any number of workers.
+        let part_length = workers.part_length(ordered.len(), TOUCH_MIN).next_multiple_of(8);
+        near.filter(workers, ordered.chunks_mut(part_length), |candidates, near| {
             kernels.run(TouchWork { touching, candidates, near })
         });
         for contact in &near.items {
@@ -363,6 +366,40 @@ mod tests {
         }
         assert!(found_count > 1_000 && on_rim_count > 20, "{found_count}, {on_rim_count}");
         assert_eq!(missed, 0, "of {found_count}");
+    }
+
+    #[test]
+    fn workers_find_the_candidates_of_one_worker_whatever_has_room() {
+        let model = sheet(SIDE, SPACING);
+        let particles = load::slots(&model);
+        let kernels = Kernels::best();
+        let mut random = Random(5);
+        let states: Vec<_> = particles.iter().map(|one| rolled(*one, &mut random)).collect();
+        let mut tree = TileTree::new(particles.len());
+        tree.begin_paths(&states, kernels);
+        tree.refit([0.0, SPAN], kernels);
+        let mut all = search(&tree, (&states, &particles), (true, 0.0, SPAN));
+        all.kernels = kernels;
+        let find = |room: usize, worker_count: usize| {
+            let mut workers = Workers::new(kernels, worker_count);
+            let mut contacts = SurfaceContacts::new(&model, &particles, (SPACING, kernels), room);
+            contacts.set_worker_count(worker_count);
+            let end = contacts.find(&all, &mut workers);
+            let found = contacts.candidates.iter().map(|one| (one.slot, one.triangle));
+            (found.collect::<Vec<_>>(), end, contacts.points.items.len())
+        };
+        let (expected, _, _) = find(8 * particles.len(), 1);
+        let (_, _, point_count) = find(8 * particles.len(), 2);
+        assert!(expected.len() > 600 && point_count > expected.len() + 200, "{point_count}");
+        // There is no room for some of the candidates, for the share of a worker, or for one of the points.
+        for room in [512, expected.len() - 1, expected.len(), point_count - 1, point_count] {
+            for worker_count in [1, 2, 3, 8] {
+                let (found, end, _) = find(room, worker_count);
+                let fitting = expected.len().min(room);
+                assert!(found == expected[..fitting], "{worker_count} workers, {room}");
+                assert_eq!(end.is_continue(), fitting == expected.len(), "{worker_count}, {room}");
+            }
+        }
     }
 
     #[test]

@@ -3,8 +3,9 @@
 //! Sixteen particles that are neighbours at load form a tile. The tree above the tiles keeps its form from load
 //! to load: only the boxes follow the particles.
 
-use super::box_tree::{BoxTree, NodePair, PairSearch, Roots, Search, Within, pair_order};
-use super::gathered::{Gathered, NO_SCRATCHES, Room, parts};
+use super::box_tree::{BoxTree, NodePair, PairSearch, Search, SearchRoots, Within, pair_order};
+use super::gathered::{Gathered, NO_SCRATCHES, Room};
+use super::pair_batch::PairBatch;
 use super::tile::{TILE, TILE_LENGTH, Tile, coordinates, mark_all, members, take_lowest};
 use crate::contacts::bounds::Bounds;
 use crate::kernels::Kernels;
@@ -12,9 +13,6 @@ use crate::kernels::lanes::{LaneWork, PackedParticle, Wide, axes};
 use crate::kernels::vectors::dot;
 use crate::scene::model::Model;
 use crate::store::workers::Workers;
-
-/// Number of pairs of tiles that are examined together.
-const TILE_PAIRS_MAX: usize = 512;
 
 /// The tiles and the boxes above them.
 #[derive(Debug, Clone, Default)]
@@ -30,7 +28,7 @@ pub(super) struct TileTree {
     pub(super) strays: Vec<u16>,
     particle_count: usize,
     /// Where the running search begins.
-    roots: Roots,
+    roots: SearchRoots,
 }
 
 impl TileTree {
@@ -49,7 +47,7 @@ impl TileTree {
             displacements,
             strays,
             particle_count: count,
-            roots: Roots::default(),
+            roots: SearchRoots::default(),
         }
     }
 
@@ -140,8 +138,8 @@ impl TileTree {
         let kernels = workers.kernels;
         self.roots.find(Within(&self.boxes), query.distance, kernels);
         let tree = &*self;
-        let roots = parts(&tree.roots.pairs, workers);
-        found.extend(workers, roots, &mut NO_SCRATCHES.clone(), |roots, room, ()| {
+        let (roots, scratches) = (tree.roots.pairs.as_slice(), &mut NO_SCRATCHES.clone());
+        found.extend(workers, roots, scratches, |roots, room, ()| {
             tree.search_below(roots, (query, kernels), except, &mut |pair| accept(pair, room))
         })
     }
@@ -153,23 +151,13 @@ impl TileTree {
         except: &impl Fn([u32; 2]) -> [u16; TILE],
         accept: &mut impl FnMut([u32; 2]) -> Search,
     ) -> Search {
-        let mut tile_pairs = [[0; 2]; TILE_PAIRS_MAX];
-        let mut count = 0;
-        let mut examine = |pairs: &[[u32; 2]]| {
+        let mut tile_pairs = PairBatch::new(|pairs| {
             kernels.run(SearchWork { tree: self, pairs, query, except, accept: &mut *accept })
-        };
+        });
         let (nesting, distance) = (Within(&self.boxes), query.distance);
-        let add = &mut |pair| {
-            tile_pairs[count] = pair;
-            count += 1;
-            if count < TILE_PAIRS_MAX {
-                return Search::Continue(());
-            }
-            count = 0;
-            examine(&tile_pairs)
-        };
-        kernels.run(PairSearch { nesting, roots, distance, accept: add })?;
-        examine(&tile_pairs[..count])
+        let accept = &mut |pair| tile_pairs.add(pair);
+        kernels.run(PairSearch { nesting, roots, distance, accept })?;
+        tile_pairs.finish()
     }
 }
 

@@ -1,18 +1,16 @@
 //! Finds the candidates of a step: the nearest points of the triangles that particles come near.
 
 use super::super::box_tree::{NodePair, Search};
-use super::super::gathered::{Gathered, parts};
+use super::super::gathered::Gathered;
 use super::super::load::{LoadPairs, PairMasks};
 use super::super::order::order_key;
+use super::super::pair_batch::PairBatch;
 use super::candidate::{Candidate, add_candidate, has_candidate};
+use super::near_tiles::NearTiles;
 use super::nearby::{NearPoint, NearbyWork};
-use super::placed_tile::NearTiles;
 use super::surface::Surface;
 use super::triangle_tiles::{AtLoad, SurfaceSearch, TriangleTiles, Wanted};
 use crate::store::workers::Workers;
-
-/// Number of particles and triangles in reach that are examined together.
-const IN_REACH_MAX: usize = 1024;
 
 /// Finds the nearest points of particles and triangles that come near each other.
 #[derive(Clone, Copy)]
@@ -26,7 +24,7 @@ pub(super) struct Finding<'a> {
 }
 
 impl Finding<'_> {
-    /// Passes those below some roots of the search to `accept`.
+    /// Passes the nearest points below some roots of the search to `accept`.
     pub(super) fn find(
         self,
         roots: &[NodePair],
@@ -34,28 +32,18 @@ impl Finding<'_> {
         accept: &mut impl FnMut(NearPoint) -> Search,
     ) -> Search {
         let Self { surface, tiles, load_pairs, rims, search } = self;
-        let mut find = |pairs: &[[u32; 2]]| {
+        let mut in_reach = PairBatch::new(|pairs| {
             let accept = &mut *accept;
             search.kernels.run(NearbyWork { surface, load_pairs, search, pairs, accept })
-        };
-        let mut in_reach = [[0; 2]; IN_REACH_MAX];
-        let mut count = 0;
+        });
         let at_load =
             |tiles| AtLoad { never: load_pairs.untouchable(tiles), rim: rims.of_tiles(tiles) };
-        let add = &mut |pair| {
-            in_reach[count] = pair;
-            count += 1;
-            if count < IN_REACH_MAX {
-                return Search::Continue(());
-            }
-            count = 0;
-            find(&in_reach)
-        };
-        tiles.search((roots, near_tiles), (surface, search, Wanted::Nearest), &at_load, add)?;
-        find(&in_reach[..count])
+        let (below, all) = ((roots, near_tiles), (surface, search, Wanted::Nearest));
+        tiles.search(below, all, &at_load, &mut |pair| in_reach.add(pair))?;
+        in_reach.finish()
     }
 
-    /// Replaces `points` by those that several workers find. Breaks if there are too many.
+    /// Replaces `points` by those that several workers find. Breaks if there is no room for them.
     pub(super) fn gather(
         self,
         points: &mut Gathered<NearPoint>,
@@ -63,10 +51,12 @@ impl Finding<'_> {
         workers: &mut Workers,
     ) -> Search {
         points.items.clear();
-        let roots = parts(&self.tiles.roots.pairs, workers);
-        points.extend(workers, roots, near_tiles, |roots, points, near_tiles| {
-            self.find(roots, near_tiles, &mut |point| points.add(point))
-        })
+        let roots = &self.tiles.roots.pairs;
+        let gathered =
+            points.try_extend(workers, roots, near_tiles, |roots, points, near_tiles| {
+                self.find(roots, near_tiles, &mut |point| points.add(point))
+            });
+        gathered.unwrap_or(Search::Break(()))
     }
 }
 

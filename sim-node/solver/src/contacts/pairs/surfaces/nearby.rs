@@ -38,8 +38,7 @@ impl<F: FnMut(NearPoint) -> Search> LaneWork for NearbyWork<'_, F> {
     #[inline(always)]
     fn run<W: Wide>(self) -> Search {
         let Self { surface, load_pairs, search, pairs, accept } = self;
-        let (groups, rest) = pairs.as_chunks::<8>();
-        for pairs in groups {
+        for pairs in pairs.chunks(8) {
             let NearLanes { on_face, mut near } = near_lanes::<W>(surface, search, pairs);
             while let Some(lane) = take_lowest(&mut near) {
                 let pair = pairs[lane as usize];
@@ -56,16 +55,11 @@ impl<F: FnMut(NearPoint) -> Search> LaneWork for NearbyWork<'_, F> {
                 }
             }
         }
-        for pair in rest {
-            if let Some(point) = nearby((surface, load_pairs), search, *pair) {
-                accept(point)?;
-            }
-        }
         Search::Continue(())
     }
 }
 
-/// A bit for each of eight particles and their triangles.
+/// A bit for each of at most eight particles and their triangles.
 struct NearLanes {
     /// The nearest point is on the face.
     on_face: u32,
@@ -77,9 +71,10 @@ struct NearLanes {
 fn near_lanes<W: Wide>(
     surface: &Surface,
     search: &SurfaceSearch<'_>,
-    pairs: &[[u32; 2]; 8],
+    pairs: &[[u32; 2]],
 ) -> NearLanes {
-    let (mut slots, mut triangles) = ([0; 8], [0; 8]);
+    // Copies of the first pair fill the rest, so that a pair is examined in the same way wherever a batch ends.
+    let (mut slots, mut triangles) = ([pairs[0][0]; 8], [pairs[0][1]; 8]);
     for (lane, [slot, triangle]) in pairs.iter().enumerate() {
         (slots[lane], triangles[lane]) = (*slot, *triangle);
     }
@@ -92,7 +87,8 @@ fn near_lanes<W: Wide>(
     let distance = W::splat(search.distance);
     let near = W::bits(length.is_below(distance)) | W::bits(at_end.is_below(distance));
     let beside_near = if on_face == 0xff { 0 } else { edges_near(&corners, search.distance) };
-    NearLanes { on_face, near: near & on_face | beside_near & !on_face }
+    let used = (1 << pairs.len()) - 1;
+    NearLanes { on_face, near: (near & on_face | beside_near & !on_face) & used }
 }
 
 /// Returns a bit for each triangle with an edge that a particle may come nearer to than `distance`: no point of it

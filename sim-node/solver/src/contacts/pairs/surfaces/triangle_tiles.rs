@@ -1,12 +1,14 @@
 //! Tiles of triangles, to find those that particles come near.
 
-use super::super::box_tree::{Between, BoxTree, NodePair, PairSearch, Roots, Search};
+use super::super::box_tree::{Between, BoxTree, NodePair, PairSearch, Search, SearchRoots};
 use super::super::load::LaneMasks;
+use super::super::pair_batch::PairBatch;
 use super::super::tile::{
     TILE, TILE_LENGTH, coordinates, lanes_in_box, mark_all, members, take_lowest,
 };
 use super::super::tile_tree::TileTree;
-use super::placed_tile::{Moving, NearTiles};
+use super::near_tiles::NearTiles;
+use super::placed_tile::Moving;
 use super::surface::Surface;
 use super::triangle_tile::TriangleTile;
 use crate::contacts::bounds::Bounds;
@@ -17,8 +19,6 @@ use crate::store::workers::Workers;
 
 /// A bit for each triangle of a tile.
 const ALL_LANES: u32 = (1 << TILE_LENGTH) - 1;
-/// Number of pairs of tiles that are examined together.
-const TILE_PAIRS_MAX: usize = 512;
 /// Fewest tiles that a worker refits.
 const REFIT_MIN: usize = 64;
 
@@ -31,7 +31,7 @@ pub(super) struct TriangleTiles {
     /// By tile: a bit for each whole triangle with a stray at a corner. All triangles have one if all paths begin.
     strays: Vec<u16>,
     /// Where the running search begins.
-    pub(super) roots: Roots,
+    pub(super) roots: SearchRoots,
 }
 
 impl TriangleTiles {
@@ -41,7 +41,7 @@ impl TriangleTiles {
             tiles: vec![TriangleTile::EMPTY; count],
             boxes: BoxTree::new(count),
             strays: vec![0; count],
-            roots: Roots::default(),
+            roots: SearchRoots::default(),
         }
     }
 
@@ -96,7 +96,7 @@ impl TriangleTiles {
     ) -> Search {
         let Self { tiles, boxes, strays, .. } = self;
         let (distance, kernels) = (search.distance, search.kernels);
-        let mut examine = |pairs: &[[u32; 2]]| {
+        let mut tile_pairs = PairBatch::new(|pairs| {
             let (near_tiles, accept) = (&mut *near_tiles, &mut *accept);
             kernels.run(SearchWork {
                 tiles,
@@ -109,21 +109,11 @@ impl TriangleTiles {
                 at_load,
                 accept,
             })
-        };
-        let mut tile_pairs = [[0; 2]; TILE_PAIRS_MAX];
-        let mut count = 0;
-        let add = &mut |pair| {
-            tile_pairs[count] = pair;
-            count += 1;
-            if count < TILE_PAIRS_MAX {
-                return Search::Continue(());
-            }
-            count = 0;
-            examine(&tile_pairs)
-        };
+        });
         let nesting = Between([&search.tree.boxes, boxes]);
-        kernels.run(PairSearch { nesting, roots, distance, accept: add })?;
-        examine(&tile_pairs[..count])
+        let accept = &mut |pair| tile_pairs.add(pair);
+        kernels.run(PairSearch { nesting, roots, distance, accept })?;
+        tile_pairs.finish()
     }
 }
 
@@ -220,11 +210,12 @@ impl<A: Fn([u32; 2]) -> AtLoad, F: FnMut([u32; 2]) -> Search> LaneWork for Searc
             let first_triangle = TILE_LENGTH * right;
             let [stray_lanes, stray_triangles] =
                 [tree.strays[left as usize], strays[right as usize]].map(u32::from);
-            let (tile, triangles) = if stray_triangles == 0 {
+            let tile = &tree.tiles[left as usize];
+            let triangles = if stray_triangles == 0 {
                 let triangles = (right, tile_of(surface, first_triangle));
-                (&tree.tiles[left as usize], near_tiles.spheres::<W>(triangles, states, half))
+                near_tiles.spheres::<W>(triangles, states, half)
             } else {
-                (&tree.tiles[left as usize], &tiles[right as usize])
+                &tiles[right as usize]
             };
             // A particle and a triangle that meet at any time are at most this far apart in the middle of the time.
             let relative =
