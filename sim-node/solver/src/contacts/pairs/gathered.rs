@@ -5,7 +5,7 @@ use crate::kernels::worker_pool::WORKERS_MAX;
 use crate::store::workers::Workers;
 
 /// Number of parts for each worker of a search, since some parts take longer than others.
-const PARTS_PER_WORKER: usize = 8;
+const PARTS_PER_WORKER: usize = 4;
 
 /// Fewest roots in a part of a search: a worker needs a microsecond to begin.
 const ROOTS_MIN: usize = 4;
@@ -240,9 +240,9 @@ mod tests {
     #[test]
     fn one_worker_finds_all_if_another_has_no_room_for_its_share() {
         // The parts of one of eight workers, which has room for 1,000.
-        let of_one_worker = |one: u32| (one / 157).is_multiple_of(8);
+        let of_one_worker = |one: u32| (one / 313).is_multiple_of(8);
         let expected = gather(4000, 1, of_one_worker);
-        assert_eq!(expected.0.len(), 1 + 8 * 157);
+        assert_eq!(expected.0.len(), 1 + 4 * 313);
         assert_eq!(gather(4000, 8, of_one_worker), expected);
     }
 
