@@ -225,20 +225,22 @@ impl ParticleStore {
 
     /// Copies the state at the start of a step, with velocities in the place of displacements.
     pub(crate) fn unpack(&mut self, states: &[Particle]) {
-        self.graph.unpack(states);
-        for patch in &mut self.patches {
-            patch.unpack(states);
+        let Self { workers, graph, patches, crowds, .. } = self;
+        graph.unpack(states);
+        for patch in patches {
+            patch.unpack(states, workers);
         }
-        for crowd in &mut self.crowds {
+        for crowd in crowds {
             crowd.unpack(states);
         }
     }
 
     /// Writes the state back at the end of a step. Returns the number of particles that froze.
     pub(crate) fn pack(&mut self, states: &mut [Particle], h: f32) -> u64 {
-        let patches: u64 = self.patches.iter_mut().map(|patch| patch.pack(states, h)).sum();
-        let crowds: u64 = self.crowds.iter_mut().map(|crowd| crowd.pack(states, h)).sum();
-        patches + crowds + self.graph.pack(states, h)
+        let Self { workers, graph, patches, crowds, .. } = self;
+        let patches: u64 = patches.iter_mut().map(|patch| patch.pack(states, h, workers)).sum();
+        let crowds: u64 = crowds.iter_mut().map(|crowd| crowd.pack(states, h)).sum();
+        patches + crowds + graph.pack(states, h)
     }
 
     /// Runs the swept stages of a substep, from `Predict` to `Advance`. Returns

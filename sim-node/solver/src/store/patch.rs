@@ -12,6 +12,8 @@ pub(crate) mod sheets;
 mod span;
 mod wind;
 
+use std::ops::Range;
+
 use band::LentRows;
 use band_forces::LentForces;
 use bands::Bands;
@@ -21,8 +23,7 @@ use sheet_layout::SheetLayout;
 use wind::SheetWindWork;
 
 use super::layout::Layout;
-use super::publish::{PublishedMotion, publish};
-use super::rows::{RowLayout, RowState, Rows};
+use super::rows::{RowLayout, Rows};
 use super::survey::FamilySoftness;
 use super::workers::Workers;
 use crate::constraints::bends::families::BendFamily;
@@ -31,7 +32,6 @@ use crate::constraints::families::{Family, Sheet};
 use crate::constraints::fields::Pass;
 use crate::constraints::parameters::ConstraintParameters;
 use crate::kernels::Kernels;
-use crate::kernels::lanes::axes;
 use crate::kernels::lent_slice::LentSlice;
 use crate::state::particles::Particle;
 use crate::step::schedule::{Schedule, ScheduledStage};
@@ -134,24 +134,15 @@ impl Patch {
     }
 
     /// Copies the state at the start of a step, with velocities in the place of displacements.
-    pub(crate) fn unpack(&mut self, states: &[Particle]) {
+    pub(crate) fn unpack(&mut self, states: &[Particle], workers: &mut Workers) {
+        self.rows.unpack(&states[self.particles()], workers);
+    }
+
+    /// Numbers of the particles.
+    fn particles(&self) -> Range<usize> {
+        let RowLayout { rows, columns, .. } = self.rows.layout;
         let first = self.sheet.first as usize;
-        let columns = self.rows.layout.columns;
-        for row in 0..self.rows.layout.rows {
-            let states = &states[first + row * columns..][..columns];
-            let RowState { x, w, d } = self.rows.state_mut(row);
-            for axis in 0..3 {
-                for (number, state) in x[axis].iter_mut().zip(states) {
-                    *number = state.position[axis];
-                }
-                for (number, state) in d[axis].iter_mut().zip(states) {
-                    *number = state.velocity[axis];
-                }
-            }
-            for (number, state) in w.iter_mut().zip(states) {
-                *number = state.inverse_mass;
-            }
-        }
+        first..first + rows * columns
     }
 
     /// Runs the stages of a pass on all rows. Returns true if any constraint was marked as torn.
@@ -203,20 +194,9 @@ impl Patch {
     }
 
     /// Writes the state back. Returns the number of particles that froze.
-    pub(crate) fn pack(&mut self, states: &mut [Particle], h: f32) -> u64 {
-        let mut frozen_count = 0;
-        let first = self.sheet.first as usize;
-        let columns = self.rows.layout.columns;
-        for row in 0..self.rows.layout.rows {
-            let states = &mut states[first + row * columns..][..columns];
-            let RowState { x, d, .. } = self.rows.state_mut(row);
-            for (column, state) in states.iter_mut().enumerate() {
-                let vector = |fields: &[&mut [f32]; 3]| axes(|axis| fields[axis][column]);
-                let motion = PublishedMotion { position: vector(&x), displacement: vector(&d), h };
-                frozen_count += u64::from(publish(state, motion));
-            }
-        }
-        frozen_count
+    pub(crate) fn pack(&mut self, states: &mut [Particle], h: f32, workers: &mut Workers) -> u64 {
+        let particles = self.particles();
+        self.rows.pack(&mut states[particles], h, workers)
     }
 
     /// Computes the velocities that the wind adds in the running substep.

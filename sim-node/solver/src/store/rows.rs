@@ -10,6 +10,7 @@ mod layout;
 mod measure;
 pub(crate) mod particles;
 pub(crate) mod paths;
+mod states;
 
 pub(crate) use forces::RowForces;
 pub(crate) use layout::{LINE_LENGTH, RowLayout, STATE_FIELDS};
