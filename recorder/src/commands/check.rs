@@ -8,6 +8,7 @@ use recorder::{CheckExtent, CheckReport, Finding, ReadError, check_file, open_re
 use serde::Serialize;
 use sim_contract::{Stop, printable_line};
 
+use crate::cli::counted::counted;
 use crate::cli::exit::Exit;
 use crate::cli::output::{self, AsJson};
 use crate::cli::progress::progress_bytes;
@@ -86,18 +87,18 @@ impl fmt::Display for FileReport<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let verdict = match self.finding_count {
             0 => "sound".to_owned(),
-            1 => "1 finding".to_owned(),
-            count => format!("{count} findings"),
+            count => counted(count, "finding"),
         };
         let extent = self.extent;
         let file = printable_line(self.file);
-        write!(f, "{file}: {verdict}: {} snapshots", extent.snapshot_count)?;
+        write!(f, "{file}: {verdict}: {}", counted(extent.snapshot_count, "snapshot"))?;
         if let Some([first, last]) = extent.steps {
             write!(f, " (steps {first}..={last})")?;
         }
         let (messages, chunks, bytes) =
             (extent.message_count, extent.chunk_count, extent.size_bytes);
-        write!(f, ", {messages} messages, {chunks} chunks, {bytes} bytes")?;
+        let [messages, chunks] = [counted(messages, "message"), counted(chunks, "chunk")];
+        write!(f, ", {messages}, {chunks}, {bytes} bytes")?;
         if extent.declared_missing > 0 {
             write!(f, "; the file declares {} missing messages", extent.declared_missing)?;
         }

@@ -14,6 +14,7 @@ use serde::Serialize;
 use sim_contract::{LoadHeader, Stop, Triangle, is_being_written, printable_line};
 use sim_solver::{Scene, Solver};
 
+use crate::cli::counted::counted;
 use crate::cli::exit::Exit;
 use crate::cli::file_args::{OverwriteArgs, refuse_own_input};
 use crate::cli::output::{self, AsJson};
@@ -189,7 +190,7 @@ impl Repaired<'_> {
 impl fmt::Display for Repaired<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let output = printable_line(&self.output);
-        write!(f, "written     {output}: {} snapshots", self.snapshot_count)?;
+        write!(f, "written     {output}: {}", counted(self.snapshot_count, "snapshot"))?;
         if let Some([first, last]) = self.steps {
             write!(f, " (steps {first}..={last})")?;
         }

@@ -8,8 +8,8 @@ use super::real_time::cpus::Cpus;
 use super::real_time::preparation::{Prepared, prepare};
 use super::real_time::rest::Rest;
 
-/// Number of particles from which on the default is more than one thread. Of smaller scenes, the solver divides no more
-/// than their contacts.
+/// Number of particles from which on the default is more than one thread. In smaller scenes, the solver divides only
+/// the contacts.
 const SHARED_MIN: usize = 4000;
 
 impl Node {

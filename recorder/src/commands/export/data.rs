@@ -6,6 +6,7 @@ use std::path::Path;
 use recorder::Existing;
 use serde::Serialize;
 
+use crate::cli::counted::counted;
 use crate::cli::output;
 use crate::export::data::written_files::WrittenFiles;
 use crate::export::data::{csv, foxglove, npz, obj, pc2, ros2, usda, vtk};
@@ -99,6 +100,7 @@ impl Written {
 impl fmt::Display for Written {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { target, snapshot_count, first_step, last_step, .. } = self;
-        write!(f, "{target}: {snapshot_count} snapshots (steps {first_step}..={last_step})")
+        let snapshots = counted(*snapshot_count as u64, "snapshot");
+        write!(f, "{target}: {snapshots} (steps {first_step}..={last_step})")
     }
 }

@@ -8,6 +8,7 @@ use serde::Serialize;
 use sim_contract::printable_line;
 
 use super::timing::Timing;
+use crate::cli::counted::counted;
 
 /// The content of a recording, as printed.
 #[derive(Debug, Serialize)]
@@ -196,10 +197,4 @@ impl fmt::Display for Info {
             None => write!(f, "\ntiming      none ({})", self.untimed_reason()),
         }
     }
-}
-
-/// Returns a number with its noun, such as "1 particle" or "2 particles".
-fn counted(count: u32, noun: &str) -> String {
-    let ending = if count == 1 { "" } else { "s" };
-    format!("{count} {noun}{ending}")
 }

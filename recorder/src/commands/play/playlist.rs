@@ -10,6 +10,7 @@ use sim_contract::clock::SECOND_NS;
 use super::position::Position;
 use super::recording::{Recording, Start};
 use super::replay::Recorded;
+use crate::cli::counted::counted;
 use crate::cli::output;
 
 /// A recorded step of a file.
@@ -313,8 +314,9 @@ impl Junction {
         };
         if missing > 0 {
             let (one, two) = (before.path.display(), next.path().display());
+            let snapshots = counted(missing, "snapshot");
             output::note(&format!(
-                "warning: {missing} snapshots between {one} and {two} are missing, so {two} plays as a run of its \
+                "warning: {snapshots} missing between {one} and {two}, so {two} plays as a run of its \
                  own. If another file of this recording has them, name it between the two"
             ));
         }

@@ -13,6 +13,7 @@ use sim_solver::Solver;
 use super::complete_state::keyframe_of;
 use super::position::Position;
 use super::replay::Recorded;
+use crate::cli::counted::counted;
 use crate::cli::damaged_input::lacks;
 use crate::cli::output;
 
@@ -215,9 +216,10 @@ impl Recording {
         }
         self.has_named_gap = true;
         let (path, from, to) = (output::path_text(&self.path), last.step, row.step);
+        let snapshots = counted(missing, "snapshot");
         output::note(&format!(
-            "warning: {path} lacks {missing} snapshots between steps {from} and {to}, and possibly more later; \
-             `recorder info` counts them all, and a recording of this replay will not know of them"
+            "warning: {path} lacks {snapshots} between steps {from} and {to}, and possibly more later; \
+             `recorder info` reports the total. A recording of this replay does not show the gap"
         ));
     }
 

@@ -13,7 +13,7 @@ use super::writing::names::FileNames;
 use crate::cli::endpoint_args::EndpointArgs;
 use crate::cli::file_args::FileArgs;
 use crate::cli::output::AsJson;
-use crate::cli::parse::{self, whole_number, whole_number_in};
+use crate::cli::parse::{self, whole_number};
 
 /// Default memory for snapshots that wait.
 const QUEUE_BYTES_DEFAULT: u64 = 256 << 20;
@@ -83,10 +83,10 @@ pub(crate) struct RecordArgs {
     /// End N steps after the first recorded step [default: no limit]
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = whole_number)]
     pub(super) steps: Option<u64>,
-    /// Memory for snapshots that wait to be written, in bytes, at least 1 MiB. Snapshots that do
+    /// Memory for snapshots that wait to be written, such as 512MiB, from 1MiB to 1TiB. Snapshots that do
     /// not fit are lost and counted. With --black-box, also the memory for what is
     /// kept, besides the last second or two
-    #[arg(long, value_name = "BYTES", default_value_t = QUEUE_BYTES_DEFAULT,
+    #[arg(long, value_name = "SIZE", default_value = "256MiB",
         allow_hyphen_values = true, value_parser = queue_bytes)]
     pub(super) queue_bytes: u64,
     /// Longest time that messages wait in memory, from 100ms to 1h: what a killed recorder loses
@@ -166,7 +166,9 @@ fn black_box_span(text: &str) -> Result<Duration, String> {
 }
 
 fn queue_bytes(text: &str) -> Result<u64, String> {
-    whole_number_in(text, &(1 << 20..=1 << 40))
+    let size = parse::size_bytes(text)?;
+    let is_valid = (1 << 20..=1 << 40).contains(&size);
+    is_valid.then_some(size).ok_or_else(|| "it must be a size from 1MiB to 1TiB".to_owned())
 }
 
 impl RecordArgs {
@@ -197,5 +199,20 @@ impl RecordArgs {
             "{option} needs a limit of a file, or --follow: add --split-size or --split-duration\n"
         );
         Err(clap::Error::raw(ErrorKind::MissingRequiredArgument, text))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_queue_is_a_size_within_limits() {
+        assert_eq!(queue_bytes("512MiB"), Ok(512 << 20));
+        assert_eq!((queue_bytes("1048576"), queue_bytes("1TiB")), (Ok(1 << 20), Ok(1 << 40)));
+        for text in ["1048575", "1025GiB"] {
+            assert_eq!(queue_bytes(text).unwrap_err(), "it must be a size from 1MiB to 1TiB");
+        }
+        assert!(queue_bytes("much").unwrap_err().contains("such as 100MB or 2GiB"));
     }
 }

@@ -18,6 +18,7 @@ use super::messages::Messages;
 use super::queue::{FileEnd, Item, Queue};
 use super::split::{FileBegin, SplitArgs, WritePosition};
 use super::stop_reason::StopReason;
+use crate::cli::counted::counted;
 use crate::cli::output;
 use selector::Selector;
 use time_limit::{FirstStep, TimeLimit};
@@ -277,9 +278,10 @@ impl Feed {
     fn warn_of_skipped(&mut self) {
         let Skipped { count, last_step } = self.intake.take_skipped();
         if count > 0 {
+            let snapshots = counted(count, "snapshot");
             output::note(&format!(
                 "warning: the replay began in the middle of a recording and could not publish a complete state \
-                 there, so {count} snapshots up to step {last_step}, before the first keyframe, are not recorded"
+                 there, so the recording lacks {snapshots} up to step {last_step}, before the first keyframe"
             ));
         }
     }

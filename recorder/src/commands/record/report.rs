@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use recorder::{Closing, Topic};
 use serde::Serialize;
 
+use crate::cli::counted::counted;
 use crate::cli::output;
 
 /// The files that a recording has written.
@@ -126,8 +127,8 @@ impl fmt::Display for Report {
             writeln!(f, "lost        {topic} {count}")?;
         }
         if self.before_first_keyframe > 0 {
-            let count = self.before_first_keyframe;
-            writeln!(f, "of these    {count} snapshots before the first keyframe")?;
+            let snapshots = counted(self.before_first_keyframe, "snapshot");
+            writeln!(f, "of these    {snapshots} before the first keyframe")?;
         }
         write!(f, "stopped     {}", self.stop_reason)
     }

@@ -4,8 +4,8 @@
 use std::marker::PhantomData;
 use std::ops::Range;
 
-/// A slice that lends its parts to threads: no two at the same time, but one after the other. The parts of
-/// one thread may overlap those of another, which safe splitting does not allow.
+/// A slice whose parts threads use in turn. Parts may overlap, which safe splitting does not allow, but no two
+/// overlapping parts are in use at once.
 #[derive(Debug)]
 pub(crate) struct LentSlice<'a, T> {
     first: *mut T,
@@ -28,9 +28,8 @@ impl<'a, T> LentSlice<'a, T> {
     /// If the range is not within the slice.
     ///
     /// # Safety
-    /// As long as the part is used, nobody may use another one that has an element of it, and what another
-    /// thread has done with such an element must have happened before, as [`super::worker_pool::Milestone`]
-    /// ensures.
+    /// While the part is in use, no overlapping part may be. If another thread has used one, that must have happened
+    /// before, as [`super::worker_pool::Milestone`] ensures.
     #[allow(clippy::mut_from_ref, reason = "the caller ensures that no two parts overlap")]
     pub(crate) unsafe fn part(&self, range: Range<usize>) -> &mut [T] {
         assert!(range.start <= range.end && range.end <= self.length, "{range:?} is outside");
@@ -48,7 +47,7 @@ mod tests {
     use crate::kernels::worker_pool::{Milestone, WorkerPool};
 
     #[test]
-    fn a_part_goes_to_another_thread_behind_a_milestone() {
+    fn a_part_goes_to_another_thread_after_a_milestone() {
         let mut numbers = [0_u32; 6];
         let mut pool = WorkerPool::new(2);
         for round in 1..=200 {

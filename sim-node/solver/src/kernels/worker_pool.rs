@@ -26,6 +26,9 @@ const SPINS: u32 = 1 << 11;
 /// The same number if there are more workers than processors: another worker needs the processor.
 const SPINS_CROWDED: u32 = 1 << 6;
 
+/// Checks for a milestone before a worker yields. It is usually reached long before.
+const MILESTONE_SPINS: u32 = 1 << 6;
+
 /// Number of processors of the process. It is read when the first pool is made: later, the calling thread may be bound to
 /// one of them, or to the others.
 static PROCESSORS: LazyLock<usize> =
@@ -275,7 +278,7 @@ impl Milestone {
     pub(crate) fn wait(&self) {
         let mut spins = 0;
         while !self.0.load(Ordering::Acquire) {
-            back_off(&mut spins, SPINS_CROWDED);
+            back_off(&mut spins, MILESTONE_SPINS);
         }
     }
 }
@@ -354,7 +357,7 @@ mod tests {
     }
 
     #[test]
-    fn workers_wake_for_a_step_after_one_with_jobs_and_park_behind_it() {
+    fn workers_wake_for_a_step_after_one_with_jobs_and_park_after_it() {
         let mut pool = WorkerPool::new(2);
         pool.is_crowded = false;
         let is_parked = |pool: &WorkerPool| pool.slot.is_parked[0].load(Ordering::SeqCst);

@@ -63,7 +63,8 @@ impl Workers {
     }
 
     /// Runs `work` on every part, each with the scratch memory of a worker, then `finish` on every
-    /// part in order. With a single worker or part, the calling thread does everything.
+    /// part in order. With a single worker or part, the calling thread does everything. Otherwise parts run side by side,
+    /// so one may wait for a milestone of another.
     ///
     /// # Panics
     /// If there are more parts than workers.

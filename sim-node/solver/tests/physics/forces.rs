@@ -279,8 +279,9 @@ fn the_impulses_of_every_step_are_the_change_of_momentum() {
 
 #[test]
 fn measuring_changes_no_bit_and_the_forces_are_the_same_on_any_number_of_threads() {
-    let text = format!("version = 1\n{EVERYTHING}").replace("columns = 19", "columns = 99");
-    let scene = Scene::from_toml(&text.replace("rows = 15", "rows = 60"), "test").unwrap();
+    // Enough rows for a band of each thread.
+    let text = format!("version = 1\n{EVERYTHING}").replace("rows = 15", "rows = 300");
+    let scene = Scene::from_toml(&text, "test").unwrap();
     let mut silent = Solver::new(&scene);
     let mut single = Solver::new(&scene);
     single.compute_forces(true);

@@ -199,7 +199,7 @@ fn a_missing_file_is_named_and_the_next_one_plays_as_a_run_of_its_own() {
     let (shown, code, messages) = played(&sandbox, &[&files[0], &files[2]]);
     assert_eq!(code, Some(0), "{messages}");
     let missing = rows(&files[1]).len();
-    let expected = format!("{missing} snapshots between {} and {} are missing", files[0], files[2]);
+    let expected = format!("{missing} snapshots missing between {} and {}", files[0], files[2]);
     assert!(messages.contains(&expected), "{messages}");
     let (one, two) = (rows(&files[0]), rows(&files[2]));
     assert_eq!(published(&shown), [one.clone(), two].concat());

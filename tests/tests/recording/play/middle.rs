@@ -103,7 +103,7 @@ fn a_recorder_declares_the_steps_before_the_first_keyframe_of_a_replay() {
     let report: Value = serde_json::from_str(&recorded.stdout).unwrap();
     assert_eq!(report["lost"], json!({ "/steps": 36, "/particles": 36 }));
     assert_eq!(report["before_first_keyframe"], 36);
-    let warning = "36 snapshots up to step 299, before the first keyframe, are not recorded";
+    let warning = "the recording lacks 36 snapshots up to step 299, before the first keyframe";
     assert!(recorded.stderr.contains(warning), "{}", recorded.stderr);
     let info = recorder(&sandbox, &["info", "--json", &output]);
     let info: Value = serde_json::from_str(&info.stdout).unwrap();

@@ -100,7 +100,7 @@ impl<T: Copy + Send> Gathered<T> {
         gathered.unwrap_or_else(|| find(roots, &mut self.room(), &mut scratches[0]))
     }
 
-    /// The same, but returns None, with no items more than before, if a worker has no room for its share.
+    /// The same, but returns `None` and adds nothing if a worker has no room for its share.
     pub(super) fn try_extend<R: Sync, S: Send>(
         &mut self,
         workers: &mut Workers,
@@ -130,7 +130,8 @@ impl<T: Copy + Send> Gathered<T> {
         (!is_one_full).then(|| self.join(part_count, worker_count))
     }
 
-    /// Appends what `find` makes of parts of a list, each by one worker: at most one item for each item of the list.
+    /// Appends the items that `find` adds for each part of a list, each by one worker: at most one for each item of the
+    /// list.
     ///
     /// # Panics
     /// If there are more parts than workers, or too many items.

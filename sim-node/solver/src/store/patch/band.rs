@@ -58,8 +58,8 @@ pub(crate) struct PassSweep<'a, 'b> {
 pub(crate) struct SweepWork<'a, 'b, 'c, const IS_MEASURED: bool> {
     pub(crate) band: Band<'a>,
     pub(crate) span: Span,
-    /// Rows of the first stage while the wave is in this part of the span. It ends behind the sheet, when the
-    /// last stage has arrived.
+    /// Rows of the first stage in this part of the sweep. The sweep extends past the last row by the lag of the last
+    /// stage.
     pub(crate) fronts: Range<usize>,
     pub(crate) sweep: PassSweep<'b, 'c>,
 }

@@ -10,8 +10,8 @@ const SHARED_MIN: usize = 4000;
 
 /// Bands of rows, one for each worker, for a pass whose stages reach down some rows in all.
 ///
-/// A worker sweeps its band, of which a trapezoid is finished then (see [`Span`]), and then the seam to the next
-/// one. The seam needs no more than the head of that band, which its worker finishes early, so nobody waits for a whole
+/// A worker sweeps its band, which finishes a trapezoid of it (see [`Span`]). Then it sweeps the seam to the next band,
+/// which needs only the first rows of that one, its head. The worker there finishes them early, so nobody waits for a whole
 /// band.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Bands {
@@ -65,66 +65,93 @@ mod tests {
     //! Every stage runs once on every row, after the stages before it on the rows that it needs.
     use super::*;
 
-    const REACHES: [usize; 6] = [0, 1, 1, 2, 0, 2];
+    const STAGES: usize = 6;
+
+    /// Reaches of the stages of a pass, with an even sum, an odd one, and none.
+    const PASSES: [[usize; STAGES]; 3] = [[0, 1, 1, 2, 0, 2], [0, 1, 1, 0, 2, 1], [0; STAGES]];
 
     /// The stages that have run, by row.
-    struct Sheet(Vec<[bool; REACHES.len()]>);
+    struct Sheet {
+        reaches: [usize; STAGES],
+        done: Vec<[bool; STAGES]>,
+    }
 
     impl Sheet {
         /// Runs the stages of a span while the wave is at these fronts, and checks that it stays within `rows`.
         fn sweep(&mut self, rows: Range<usize>, mut span: Span, fronts: Range<usize>) {
             let mut lag = 0;
-            let stages = REACHES.map(|reach| {
+            let stages = self.reaches.map(|reach| {
                 lag += reach;
                 (span.advance(reach), lag)
             });
-            for front in fronts.start..fronts.end.min(self.0.len() + lag) {
+            for front in fronts.start..fronts.end.min(self.done.len() + lag) {
                 let at_front = stages.iter().map(|(rows, lag)| (rows, front.wrapping_sub(*lag)));
                 let at_front = at_front.enumerate().filter(|(_, (rows, row))| rows.contains(row));
                 for (stage, (_, row)) in at_front {
-                    assert!(rows.contains(&row) && row + REACHES[stage] < rows.end);
+                    assert!(rows.contains(&row) && row + self.reaches[stage] < rows.end);
                     self.run(stage, row);
                 }
             }
         }
 
         fn run(&mut self, stage: usize, row: usize) {
-            for (needed, reach) in REACHES.into_iter().enumerate().take(stage) {
+            for (needed, reach) in self.reaches.into_iter().enumerate().take(stage) {
                 // Those that move a row of this constraint. The last rows begin none.
-                let last = (row + REACHES[stage] + 1).min(self.0.len() - reach);
-                let is_ready = (row.saturating_sub(reach)..last).all(|row| self.0[row][needed]);
+                let last = (row + self.reaches[stage] + 1).min(self.done.len() - reach);
+                let is_ready = (row.saturating_sub(reach)..last).all(|row| self.done[row][needed]);
                 assert!(is_ready, "stage {stage} before stage {needed} on row {row}");
             }
-            assert!(!self.0[row][stage], "stage {stage} runs twice on row {row}");
-            self.0[row][stage] = true;
+            assert!(!self.done[row][stage], "stage {stage} runs twice on row {row}");
+            self.done[row][stage] = true;
+        }
+    }
+
+    /// The parts of a sheet that threads use at the same time do not overlap.
+    fn assert_disjoint(bands: &Bands) {
+        for band in 1..bands.count {
+            let (above, below) = (bands.rows(band - 1), bands.rows(band));
+            assert_eq!(above.end, below.start);
+            // The seam begins when the band above is finished and the head below is left.
+            if let Some((seam, _)) = bands.seam(band - 1) {
+                assert!(seam.start >= bands.head(band - 1).0.end, "it has rows of the seam before");
+                assert_eq!(seam.end, bands.head(band).0.end, "it has rows behind the head");
+            }
+        }
+    }
+
+    fn sweep_all(bands: &Bands, reaches: [usize; STAGES]) {
+        let row_count = bands.row_count;
+        let mut sheet = Sheet { reaches, done: vec![[false; STAGES]; row_count] };
+        // No band waits for another one before its head is finished.
+        for band in 0..bands.count {
+            sheet.sweep(bands.rows(band), bands.span(band), 0..bands.head(band).1);
+        }
+        for band in 0..bands.count {
+            let (head, front) = bands.head(band);
+            let rest = head.end..bands.rows(band).end;
+            sheet.sweep(rest, bands.span(band), front..usize::MAX);
+            if let Some((rows, span)) = bands.seam(band) {
+                sheet.sweep(rows, span, 0..usize::MAX);
+            }
+        }
+        for (row, done) in sheet.done.iter().enumerate() {
+            let expected = reaches.map(|reach| row + reach < row_count);
+            assert_eq!(*done, expected, "row {row} of {row_count}, {} bands", bands.count);
         }
     }
 
     #[test]
-    fn every_stage_runs_once_on_every_row_behind_those_before_it() {
-        let reach = REACHES.iter().sum();
-        let counts = [75, 76, 99, 100, 101, 317];
-        for (row_count, workers) in
-            counts.into_iter().flat_map(|rows| (1..=9).map(move |one| (rows, one)))
-        {
-            let bands = Bands::new(&RowLayout::new(0, [row_count, 100], 112), workers, reach);
-            assert_eq!(bands.count, workers.min(row_count / 25));
-            let mut sheet = Sheet(vec![[false; REACHES.len()]; row_count]);
-            // No band waits for another one before its head is finished.
-            for band in 0..bands.count {
-                sheet.sweep(bands.rows(band), bands.span(band), 0..bands.head(band).1);
-            }
-            for band in 0..bands.count {
-                let (head, front) = bands.head(band);
-                let rest = head.end..bands.rows(band).end;
-                sheet.sweep(rest, bands.span(band), front..usize::MAX);
-                if let Some((rows, span)) = bands.seam(band) {
-                    sheet.sweep(rows, span, 0..usize::MAX);
-                }
-            }
-            for (row, done) in sheet.0.iter().enumerate() {
-                let expected = REACHES.map(|reach| row + reach < row_count);
-                assert_eq!(*done, expected, "row {row} of {row_count}, {workers} workers");
+    fn every_stage_runs_once_on_every_row_after_those_before_it() {
+        for reaches in PASSES {
+            let reach = reaches.iter().sum();
+            for (row_count, workers) in [75, 76, 99, 100, 101, 317]
+                .into_iter()
+                .flat_map(|rows| (1..=9).map(move |workers| (rows, workers)))
+            {
+                let bands = Bands::new(&RowLayout::new(0, [row_count, 100], 112), workers, reach);
+                assert_eq!(bands.count, workers.min(row_count / (4 * reach + 1)));
+                assert_disjoint(&bands);
+                sweep_all(&bands, reaches);
             }
         }
     }

@@ -32,10 +32,11 @@ struct Part {
 
 impl SharedSweep<'_> {
     /// Returns true if any constraint was marked as torn.
-    pub(crate) fn run(&self, workers: &mut Workers) -> bool {
+    pub(crate) fn run(self, workers: &mut Workers) -> bool {
         let left_heads = [const { Milestone::new() }; WORKERS_MAX];
         let work = |part: &mut Part, scratch: &mut WorkerScratch| {
-            part.is_marked = self.sweep(part.band, &left_heads, scratch);
+            // SAFETY: each band is one part.
+            part.is_marked = unsafe { self.sweep(part.band, &left_heads, scratch) };
         };
         let mut is_marked = false;
         let parts = (0..self.bands.count).map(|band| Part { band, is_marked: false });
@@ -44,16 +45,24 @@ impl SharedSweep<'_> {
     }
 
     /// Sweeps a band and the seam below it. `left_heads` are reached when the wave has left the head of a band.
-    fn sweep(&self, band: usize, left_heads: &[Milestone], scratch: &mut WorkerScratch) -> bool {
+    ///
+    /// # Safety
+    /// Each band must be swept once.
+    unsafe fn sweep(
+        &self,
+        band: usize,
+        left_heads: &[Milestone],
+        scratch: &mut WorkerScratch,
+    ) -> bool {
         const ALL: Range<usize> = 0..usize::MAX;
+        let left_head = left_heads[band].reach_when_dropped();
         let (rows, span) = (self.bands.rows(band), self.bands.span(band));
         if self.bands.count == 1 {
-            // SAFETY: there is no other thread.
+            // SAFETY: no other thread has a part.
             return unsafe { self.sweep_span(rows, (span, ALL), scratch) };
         }
         let (head, front) = self.bands.head(band);
         let rest = head.end..rows.end;
-        let left_head = left_heads[band].reach_when_dropped();
         // SAFETY: the seam above has rows of this band, but its thread waits until this one has left them.
         let mut is_marked = unsafe { self.sweep_span(rows, (span.clone(), 0..front), scratch) };
         drop(left_head);

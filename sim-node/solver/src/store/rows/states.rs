@@ -15,8 +15,12 @@ const PACKED_MIN: usize = 4096;
 impl Rows {
     /// Copies the state at the start of a step, row by row, with velocities in the place of displacements.
     pub(crate) fn unpack(&mut self, states: &[Particle], workers: &mut Workers) {
+        self.unpack_parts(states, workers, UNPACKED_MIN);
+    }
+
+    fn unpack_parts(&mut self, states: &[Particle], workers: &mut Workers, count_min: usize) {
         let (layout, numbers, _) = self.split_mut();
-        let row_count = workers.part_length(layout.rows, UNPACKED_MIN.div_ceil(layout.columns));
+        let row_count = workers.part_length(layout.rows, count_min.div_ceil(layout.columns));
         let numbers = numbers.chunks_mut(row_count * layout.length);
         let kernels = workers.kernels;
         workers.for_each(
@@ -28,8 +32,17 @@ impl Rows {
 
     /// Writes the state back. Returns the number of particles that froze.
     pub(crate) fn pack(&mut self, states: &mut [Particle], h: f32, workers: &mut Workers) -> u64 {
+        self.pack_parts((states, h), workers, PACKED_MIN)
+    }
+
+    fn pack_parts(
+        &mut self,
+        (states, h): (&mut [Particle], f32),
+        workers: &mut Workers,
+        count_min: usize,
+    ) -> u64 {
         let (layout, numbers, _) = self.split_mut();
-        let row_count = workers.part_length(layout.rows, PACKED_MIN.div_ceil(layout.columns));
+        let row_count = workers.part_length(layout.rows, count_min.div_ceil(layout.columns));
         let numbers = numbers.chunks_mut(row_count * layout.length);
         let parts = numbers.zip(states.chunks_mut(row_count * layout.columns));
         let kernels = workers.kernels;
@@ -170,57 +183,100 @@ mod tests {
     use crate::kernels::Kernels;
 
     const H: f32 = 0.1;
+    /// Of 13 columns, five are no group of eight.
+    const COLUMNS: usize = 13;
 
-    fn states(count: usize) -> Vec<Particle> {
+    fn states() -> Vec<Particle> {
         let number = |index: usize| ((index * 7919) % 1000) as f32 - 500.0;
         let state = |index: usize| Particle {
             position: axes(|axis| number(8 * index + axis)),
             inverse_mass: number(8 * index + 3),
             velocity: axes(|axis| number(8 * index + 4 + axis)),
-            flags: u32::MAX - u32::try_from(index).unwrap(),
+            // The last one is a signalling NaN.
+            flags: [0, 1, u32::MAX, 0x7f80_0001][index % 4],
         };
-        (0..count).map(state).collect()
+        (0..5 * COLUMNS).map(state).collect()
+    }
+
+    /// Rows of these states, by this number of workers.
+    fn rows_of(states: &[Particle], workers: &mut Workers) -> Rows {
+        let mut layout = RowLayout::new(0, [states.len() / COLUMNS, COLUMNS], 16);
+        layout.set_fields(crate::store::layout::Layout::default());
+        let mut rows = Rows::new(layout);
+        rows.allocate();
+        rows.unpack_parts(states, workers, 1);
+        rows
+    }
+
+    fn place(rows: &Rows, index: usize) -> usize {
+        rows.particle_index([index / COLUMNS, index % COLUMNS])
+    }
+
+    /// Packs the rows, and compares every bit with [`publish`].
+    fn assert_published(rows: &mut Rows, before: &[Particle], workers: &mut Workers) -> u64 {
+        let mut expected = before.to_vec();
+        let mut expected_count = 0;
+        for (index, state) in expected.iter_mut().enumerate() {
+            let at = place(rows, index);
+            let (position, displacement) = (rows.position(at), rows.displacement(at));
+            let motion = PublishedMotion { position, displacement, h: H };
+            expected_count += u64::from(publish(state, motion));
+        }
+        let mut after = before.to_vec();
+        let count = rows.pack_parts((&mut after, H), workers, 1);
+        let bits = bytemuck::cast_slice::<Particle, u32>;
+        assert_eq!(bits(&after), bits(&expected), "{workers:?}");
+        assert_eq!(count, expected_count);
+        count
+    }
+
+    fn for_each_workers(mut run: impl FnMut(&mut Workers)) {
+        for kernels in Kernels::available() {
+            for count in [1, 2, 3] {
+                run(&mut Workers::new(kernels, count));
+            }
+        }
     }
 
     #[test]
-    fn states_come_back_with_velocities_and_zeros_and_frozen_where_they_are_not_finite() {
-        // Of 13 columns, five are no group of eight.
-        let before = states(39);
-        for kernels in Kernels::available() {
-            for bad in [None, Some((0, f32::NAN)), Some((3, f32::INFINITY)), Some((38, f32::NAN))] {
-                let mut workers = Workers::new(kernels, 1);
-                let mut layout = RowLayout::new(0, [3, 13], 16);
-                layout.set_fields(crate::store::layout::Layout::default());
-                let mut rows = Rows::new(layout);
-                rows.allocate();
-                rows.unpack(&before, &mut workers);
-                for (index, state) in before.iter().enumerate() {
-                    let at = rows.particle_index([index / 13, index % 13]);
-                    assert_eq!(rows.position(at), state.position);
-                    assert_eq!(rows.displacement(at), state.velocity);
-                    assert_eq!(rows.inverse_mass(at), state.inverse_mass);
-                }
-                let mut expected = before.clone();
-                for state in &mut expected {
-                    state.velocity = state.velocity.map(|axis| axis / H + 0.0);
-                }
-                rows.set_position(1, [-0.0, 1.0, 2.0]);
-                expected[1].position = [0.0, 1.0, 2.0];
-                if let Some((index, number)) = bad {
-                    let at = rows.particle_index([index / 13, index % 13]);
-                    rows.set_displacement(at, [0.0, number, 0.0]);
-                    let state = &mut expected[index];
-                    state.velocity = [0.0; 3];
-                    state.inverse_mass = 0.0;
-                    state.flags |= sim_types::ParticleFlags::FROZEN;
-                    state.flags &= !sim_types::ParticleFlags::GRABBED;
-                }
-                let mut after = before.clone();
-                let count = rows.pack(&mut after, H, &mut workers);
-                assert_eq!(count, u64::from(bad.is_some()));
-                let bits = bytemuck::cast_slice::<Particle, u32>;
-                assert_eq!(bits(&after), bits(&expected), "{kernels:?}, {bad:?}");
+    fn rows_have_the_states_and_give_them_back() {
+        for_each_workers(|workers| {
+            let before = states();
+            let mut rows = rows_of(&before, workers);
+            for (index, state) in before.iter().enumerate() {
+                let at = place(&rows, index);
+                assert_eq!(rows.position(at), state.position);
+                assert_eq!(rows.displacement(at), state.velocity);
+                assert_eq!(rows.inverse_mass(at), state.inverse_mass);
             }
-        }
+            let (at, other) = (place(&rows, 1), place(&rows, 17));
+            rows.set_position(at, [-0.0, 1.0, -0.0]);
+            rows.set_displacement(other, [1.0, -0.0, 0.0]);
+            assert_eq!(assert_published(&mut rows, &before, workers), 0);
+        });
+    }
+
+    #[test]
+    fn a_particle_freezes_if_any_number_is_not_finite_or_its_velocity_overflows() {
+        for_each_workers(|workers| {
+            let before = states();
+            for (index, bad) in [
+                (0, [f32::NAN, f32::NAN]),
+                (9, [f32::INFINITY, f32::NEG_INFINITY]),
+                // Not finite as a velocity alone.
+                (38, [f32::INFINITY, 1e38]),
+            ] {
+                for field in 0..6 {
+                    let mut rows = rows_of(&before, workers);
+                    let at = place(&rows, index);
+                    let mut vectors = [rows.position(at), rows.displacement(at)];
+                    vectors[field / 3][field % 3] = bad[field / 3];
+                    rows.set_position(at, vectors[0]);
+                    rows.set_displacement(at, vectors[1]);
+                    let count = assert_published(&mut rows, &before, workers);
+                    assert_eq!(count, 1, "{index}, {field}");
+                }
+            }
+        });
     }
 }
