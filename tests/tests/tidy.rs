@@ -1,5 +1,5 @@
-//! The structure and the prose of the repository: dependencies between crates, the size of files and
-//! folders, the first words of doc comments, and phrases to avoid.
+//! The structure and the prose of the repository: dependencies between crates and between files, the
+//! first words of doc comments, and phrases to avoid.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -24,13 +24,6 @@ const ARROWS: [(&str, &[&str]); 10] = [
     ("viewer-bridge", &["foxglove", "recorder", "sim-cli", "sim-contract", "sim-solver"]),
     ("integration-tests", &["recorder", "sim-contract", "sim-solver", "viewer-bridge"]),
 ];
-
-/// Limit on the lines of a source file: a longer one holds more than one concept.
-const LINES_MAX: usize = 500;
-
-/// Limit on the source files of a folder, not counting its subfolders: about a dozen fit on a screen
-/// and share one role.
-const FOLDER_FILES_MAX: usize = 14;
 
 /// Words that do not begin a doc comment. It begins with a noun phrase or a third-person verb.
 const OPENINGS: [&str; 5] = ["What", "How", "Whether", "Who", "That"];
@@ -122,25 +115,6 @@ fn dependencies_between_crates_follow_the_architecture() {
     let allowed: BTreeMap<_, BTreeSet<_>> =
         ARROWS.iter().map(|(name, arrows)| (*name, arrows.iter().copied().collect())).collect();
     assert_eq!(actual, allowed);
-}
-
-#[test]
-fn source_files_are_short() {
-    for file in files(&["rs"]) {
-        let lines = read(&file).lines().count();
-        assert!(lines <= LINES_MAX, "{} has {lines} lines", file.display());
-    }
-}
-
-#[test]
-fn folders_hold_about_a_dozen_source_files() {
-    let mut counts = BTreeMap::new();
-    for file in files(&["rs", "js", "py"]) {
-        *counts.entry(file.parent().unwrap().to_owned()).or_insert(0) += 1;
-    }
-    for (folder, count) in counts {
-        assert!(count <= FOLDER_FILES_MAX, "{} has {count} source files", folder.display());
-    }
 }
 
 /// The prose of a file as one text, so that a phrase is found across lines.
