@@ -76,8 +76,9 @@ test("a drag grabs and does not select, and neither does a press that lasts", ()
   const other = shown();
   other.listeners.get("pointerdown")(other.event);
   assert.deepEqual(other.sent, []);
-  other.input.tick(other.input.tool.pressedMs + 250);
-  other.listeners.get("pointerup")({ ...other.event, type: "pointerup" });
+  const { pressedMs } = other.input.tool;
+  other.input.tick(pressedMs + 250);
+  other.listeners.get("pointerup")({ ...other.event, type: "pointerup", timeStamp: pressedMs + 250 });
   assert.deepEqual(other.sent.map(({ type }) => type), ["grab", "release"]);
   assert.deepEqual(other.selection.items, []);
 });
@@ -93,4 +94,79 @@ test("a click in another mode, a second finger and Escape select nothing", () =>
   page.listeners.get("pointerup")({ ...page.event, type: "pointerup", pointerId: 2 });
   page.listeners.get("pointerup")({ ...page.event, type: "pointerup" });
   assert.deepEqual(page.selection.items, []);
+});
+
+test("a busy page decides by the times of the events, not by those of their arrival", () => {
+  // The release of a click arrives after the page has begun to grab.
+  const click = shown();
+  click.listeners.get("pointerdown")(click.event);
+  const { pressedMs } = click.input.tool;
+  click.input.tick(pressedMs + 500);
+  click.listeners.get("pointerup")({ ...click.event, type: "pointerup", timeStamp: pressedMs + 90 });
+  assert.deepEqual(click.selection.items, [{ kind: "particle", index: 0 }]);
+  // The press of a long press arrives just before its release.
+  const press = shown();
+  const finger = { ...press.event, pointerType: "touch" };
+  press.listeners.get("pointerdown")({ ...finger, timeStamp: finger.timeStamp - 700 });
+  press.listeners.get("pointerup")({ ...finger, type: "pointerup" });
+  assert.deepEqual(press.sent.map(({ type }) => type), ["pin"]);
+  assert.deepEqual(press.selection.items, []);
+});
+
+test("a timer that was held up waits for the release behind it", (context) => {
+  let now = 1000;
+  context.mock.method(performance, "now", () => now);
+  context.mock.timers.enable({ apis: ["setTimeout"] });
+  const begin = () => {
+    const page = shown();
+    page.listeners.get("pointerdown")({ ...page.event, pointerType: "touch", timeStamp: now });
+    return page;
+  };
+  const quick = begin();
+  // The page stands still for a second, in which the finger is lifted.
+  now += 1000;
+  context.mock.timers.tick(550);
+  quick.listeners.get("pointerup")({ ...quick.event, pointerType: "touch", type: "pointerup", timeStamp: now - 900 });
+  context.mock.timers.tick(1000);
+  assert.deepEqual(quick.sent, []);
+  const long = begin();
+  now += 550;
+  context.mock.timers.tick(550);
+  assert.deepEqual(long.sent.map(({ type }) => type), ["pin"]);
+});
+
+test("P pins what is selected, not what lies under the mouse, and unpins it if all of it is pinned", () => {
+  const page = pageOf(sceneOf([0, 0, 0, 0.4, 0, 0, 0.8, 0, 0]));
+  page.listeners.get("pointermove")({ ...page.event, type: "pointermove" });
+  page.selection.set([{ kind: "particle", index: 1 }, { kind: "particle", index: 2 }]);
+  const sent = () => page.sent.splice(0).map(({ type, particle }) => [type, particle]);
+  page.simulation.expectPin(1, true);
+  assert.ok(page.input.pinByKey());
+  assert.deepEqual(sent(), [["pin", 2]]);
+  page.simulation.expectPin(2, true);
+  page.input.pinByKey();
+  assert.deepEqual(sent(), [["unpin", 1], ["unpin", 2]]);
+  page.selection.clear();
+  page.input.pinByKey();
+  assert.deepEqual(sent(), [["pin", 0]]);
+});
+
+test("a trackpad changes the brush by one step per notch, as a mouse does", () => {
+  const page = shown();
+  page.input.mode = "brush";
+  const turn = (deltaY, deltaMode = 0) => page.listeners.get("wheel")({ deltaY, deltaMode, preventDefault() {} });
+  const before = page.input.brushRadius;
+  for (let k = 0; k < 24; k++) turn(4);
+  assert.equal(page.input.brushRadius, before);
+  turn(4);
+  assert.equal(page.input.brushRadius, before - 10);
+  turn(-120);
+  assert.equal(page.input.brushRadius, before);
+  turn(3, 1);
+  assert.equal(page.input.brushRadius, before - 10, "a wheel that turns by lines");
+  // A turn back begins anew.
+  turn(90);
+  turn(-90);
+  turn(90);
+  assert.equal(page.input.brushRadius, before - 10);
 });

@@ -2,7 +2,7 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { isConsumed } from "../js/ui/keys.js";
+import { isCharacter, isConsumed } from "../js/ui/keys.js";
 import { hintText } from "../js/ui/prompts.js";
 import { cardAfter, neighbour } from "../js/ui/scene-menu.js";
 
@@ -43,4 +43,9 @@ test("the hint names what the scene has, and no right button on a touch screen",
   assert.match(hint("cloth", "ragdoll"), /anything/);
   assert.match(hint(), /particle/);
   assert.doesNotMatch(hintText([{ shape: "cloth" }], true), /Right/);
+});
+
+test("shortcuts that can be turned off are those of a single character", () => {
+  for (const name of ["r", "3", "?", "]", "+"]) assert.ok(isCharacter(name), name);
+  for (const name of [" ", "ctrl+z", "ArrowLeft", "Escape", "Tab"]) assert.ok(!isCharacter(name), name);
 });

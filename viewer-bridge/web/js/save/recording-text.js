@@ -40,6 +40,13 @@ export function describe({ state, text, seconds, snapshots, size_bytes: size, lo
 /** True while a recording is being made. @param {Recording | null} recording */
 export const isRunning = (recording) => recording?.state === "recording" || recording?.state === "finishing";
 
+/** Time for which a page shows a finished recording of another page, in ms. */
+const OF_OTHERS_MS = 15_000;
+
+/** Time after which the line of a recording that has ended goes away by itself: the page that has asked for the recording, and one
+ * that is to know of a failure, keep it. @param {Recording | null} recording @param {boolean} isOwn */
+export const endsAfterMs = (recording, isOwn) => (isOwn || recording?.state === "failed" ? Infinity : OF_OTHERS_MS);
+
 /** The reason why the button does nothing, or "".
  * @param {Recording | null} recording @param {{ isConnected: boolean, isReplay: boolean, hasNode: boolean }} page */
 export function reasonAgainst(recording, { isConnected, isReplay, hasNode }) {

@@ -2,7 +2,7 @@
 // which all pages share.
 
 import { enable, find } from "../ui/dom.js";
-import { describe, isRunning, reasonAgainst, replayAddress } from "./recording-text.js";
+import { describe, endsAfterMs, isRunning, reasonAgainst, replayAddress } from "./recording-text.js";
 
 export class RecordingControl {
   /** @param {import("../tools/tool.js").App} app @param {string | null} token */
@@ -19,28 +19,43 @@ export class RecordingControl {
     this.close = find("recording-close", HTMLButtonElement);
     /** For screen readers: the start and the end, but not each number. */
     this.said = find("recording-said", HTMLElement);
-    /** The user has closed the line of the last recording. */
-    this.isClosed = false;
+    /** The line of the last recording is closed: by the user, after a while, or because this page has not seen it run. */
+    this.isClosed = true;
+    /** This page has started or stopped the recording. */
+    this.isOwn = false;
+    this.timer = 0;
     this.button.addEventListener("click", () => this.toggle());
-    this.close.addEventListener("click", () => {
-      this.isClosed = true;
-      this.show();
-    });
+    this.close.addEventListener("click", () => this.closeLine());
     for (const topic of /** @type {const} */ (["hello", "node", "connection"])) simulation.on(topic, () => this.show());
     simulation.on("recording", () => this.update());
   }
 
   toggle() {
-    if (!this.button.disabled) this.commands.run(isRunning(this.simulation.recording) ? "stop_recording" : "record");
+    if (this.button.disabled) return;
+    this.isOwn = true;
+    this.commands.run(isRunning(this.simulation.recording) ? "stop_recording" : "record");
   }
 
   update() {
     const { recording } = this.simulation;
-    if (isRunning(recording)) this.isClosed = false;
+    clearTimeout(this.timer);
+    if (isRunning(recording) || this.isOwn) this.isClosed = false;
+    else if (!this.isClosed) this.closeLater(endsAfterMs(recording, this.isOwn));
+    if (!isRunning(recording)) this.isOwn = false;
     this.show();
     const isQuiet = recording === null || recording.state === "idle" || recording.state === "unavailable";
     const said = isQuiet ? "" : isRunning(recording) ? "Recording." : describe(recording);
     if (this.said.textContent !== said) this.said.textContent = said;
+  }
+
+  /** Closes the line of a recording that has ended. @param {number} ms */
+  closeLater(ms) {
+    if (ms < Infinity) this.timer = setTimeout(() => this.closeLine(), ms);
+  }
+
+  closeLine() {
+    this.isClosed = true;
+    this.show();
   }
 
   show() {

@@ -1,4 +1,5 @@
-// The marks of a timeline: their legend, their tooltips, and the way from one to the next.
+// The marks of a timeline: their legend, whose entries switch them off and on, their tooltips, and the way from one to
+// the next.
 
 import { cssColor, find, make, sharpContext } from "../ui/dom.js";
 import { Scale, clockText, marksByPixel } from "./timeline.js";
@@ -14,6 +15,8 @@ const KINDS = {
   late: ["--plot-b", 2, "late steps"],
   ghost: ["--ghost", 2, "first difference"],
 };
+/** Kinds that are switched off at first. A busy machine has thousands of late steps. */
+const OFF_AT_FIRST = ["late"];
 const ROW_HEIGHT = 5;
 /** Distance in pixels at which the pointer is at a mark. */
 const NEAR = 4;
@@ -46,10 +49,24 @@ export function marksAt(marks, scale, x, width) {
   return marks.filter((mark) => scale.has(mark.step) && distance(mark) <= NEAR).sort((a, b) => distance(a) - distance(b));
 }
 
+/** The kinds that occur among marks, in the order of the legend, with the number of their events. @param {Mark[]} marks */
+export function legendOf(marks) {
+  /** @type {Map<string, number>} */
+  const counts = new Map();
+  for (const { kind, count } of marks) counts.set(kind, (counts.get(kind) ?? 0) + count);
+  const kinds = Object.keys(KINDS).filter((kind) => counts.has(kind));
+  return kinds.map((kind) => ({ kind, text: kind === "ghost" ? KINDS[kind][2] : `${KINDS[kind][2]} ${counts.get(kind)}` }));
+}
+
 /** The row of marks above the slider. */
 export class MarkRow {
-  /** @param {(step: number) => void} onPick is called with the step of a mark that the user clicks */
-  constructor(onPick) {
+  /** @param {(step: number) => void} onPick is called with the step of a mark that the user clicks @param {() => void} onSwitch is called when the user switches a kind off or on */
+  constructor(onPick, onSwitch) {
+    this.onSwitch = onSwitch;
+    /** Kinds that are switched off: neither drawn nor stopped at. */
+    this.off = new Set(OFF_AT_FIRST);
+    /** Kinds in the legend, with their counts, as it shows them. */
+    this.listed = "";
     this.canvas = find("marks", HTMLCanvasElement);
     this.legend = find("mark-legend", HTMLUListElement);
     /** @type {Mark[]} */
@@ -75,12 +92,18 @@ export class MarkRow {
     return this.scale.first !== first || this.scale.last !== last;
   }
 
+  /** The marks of the kinds that are switched on. @param {Mark[]} marks */
+  shown(marks) {
+    return marks.filter(({ kind }) => !this.off.has(kind));
+  }
+
   /** Draws the marks of a track in a range, and the part that it repeats. @param {Track} track @param {Scale} scale */
   draw(track, scale) {
     const { marks, looped } = track;
     const { context, width } = sharpContext(this.canvas);
     this.scale = scale;
-    this.marks = marks.filter(({ step }) => scale.has(step));
+    const inside = marks.filter(({ step }) => scale.has(step));
+    this.marks = this.shown(inside);
     this.clock = (step) => clockText(track.sinceBegin(step));
     if (looped !== null) {
       const [from, to] = looped.map((step) => scale.fraction(step) * width);
@@ -92,21 +115,29 @@ export class MarkRow {
       context.fillStyle = cssColor(color);
       for (const pixel of pixels.keys()) context.fillRect(pixel - 0.5, row * ROW_HEIGHT, 2, ROW_HEIGHT - 1);
     }
-    this.showLegend();
+    this.showLegend(inside);
   }
 
-  /** Shows the colours of the kinds that have marks, with the number of their events. */
-  showLegend() {
-    /** @type {Map<string, number>} */
-    const counts = new Map();
-    for (const { kind, count } of this.marks) counts.set(kind, (counts.get(kind) ?? 0) + count);
-    const kinds = Object.keys(KINDS).filter((kind) => counts.has(kind));
-    const text = kinds.map((kind) => (kind === "ghost" ? KINDS[kind][2] : `${KINDS[kind][2]} ${counts.get(kind)}`));
-    if (this.legend.textContent === text.join("")) return;
-    this.legend.replaceChildren(...kinds.map((kind, index) => {
-      const item = make("li", {}, text[index]);
-      item.style.setProperty("--swatch", `var(${KINDS[kind][0]})`);
-      return item;
-    }));
+  /** Shows the colours of the kinds that have marks, with the number of their events. @param {Mark[]} marks */
+  showLegend(marks) {
+    const entries = legendOf(marks);
+    const listed = entries.map(({ text }) => text).join();
+    if (this.listed === listed) return;
+    this.listed = listed;
+    const focused = document.activeElement instanceof HTMLElement ? document.activeElement.dataset.kind : undefined;
+    this.legend.replaceChildren(...entries.map(({ kind, text }) => make("li", {}, this.legendSwitch(kind, text))));
+    if (focused !== undefined) /** @type {HTMLElement | null} */ (this.legend.querySelector(`[data-kind=${focused}]`))?.focus();
+  }
+
+  /** The entry of a kind: a switch for its marks. @param {string} kind @param {string} text */
+  legendSwitch(kind, text) {
+    const button = make("button", { type: "button", "data-kind": kind, "aria-pressed": String(!this.off.has(kind)), title: "Show these marks, and stop at them" }, text);
+    button.style.setProperty("--swatch", `var(${KINDS[kind][0]})`);
+    button.addEventListener("click", () => {
+      if (!this.off.delete(kind)) this.off.add(kind);
+      button.setAttribute("aria-pressed", String(!this.off.has(kind)));
+      this.onSwitch();
+    });
+    return button;
   }
 }

@@ -1,6 +1,7 @@
 // The timeline of a recording: playback, and the check of its hashes.
 
 import { enable, find, make } from "../ui/dom.js";
+import { Notches } from "../tools/notches.js";
 import { clockText, zoomed } from "./timeline.js";
 
 /** @typedef {import("./timeline.js").Track} Track */
@@ -10,9 +11,6 @@ const RATES = [0.1, 0.25, 0.5, 1, 2, 5, 10];
 
 /** States of a ghost whose text is about to change. */
 const PROGRESS = new Set(["opening", "comparing"]);
-
-/** Pixels that a notch of the wheel scrolls in most browsers. A touchpad sends many small turns. */
-const NOTCH = 100;
 
 /** The address of a recording, seen from the page of another or from that of the newest. @param {string} path of the page @param {string} name */
 export const addressBeside = (path, name) => `${path.replace(/(replay\/[^/]+\/)?[^/]*$/, "")}replay/${encodeURIComponent(name)}/`;
@@ -30,8 +28,7 @@ export class ReplayTrack {
     this.loopStart = find("loop-start", HTMLButtonElement);
     this.loopEnd = find("loop-end", HTMLButtonElement);
     this.zoom = find("zoom", HTMLSelectElement);
-    /** Turn of the wheel since the last change of the zoom, in pixels. */
-    this.turned = 0;
+    this.notches = new Notches();
     /** The part of the recording on show. */
     this.current = { first: 0, last: 0 };
     this.file = find("file", HTMLSelectElement);
@@ -107,10 +104,9 @@ export class ReplayTrack {
   zoomBy(event) {
     if (!this.isThere || this.zoom.disabled) return;
     event.preventDefault();
-    this.turned += event.deltaMode === WheelEvent.DOM_DELTA_PIXEL ? event.deltaY : Math.sign(event.deltaY) * NOTCH;
-    if (Math.abs(this.turned) < NOTCH) return;
-    const index = this.zoom.selectedIndex - Math.sign(this.turned);
-    this.turned = 0;
+    const notch = this.notches.add(event);
+    if (notch === 0) return;
+    const index = this.zoom.selectedIndex - notch;
     this.zoom.selectedIndex = Math.min(Math.max(0, index), this.zoom.options.length - 1);
     this.onChange();
   }

@@ -22,7 +22,7 @@ export class TimelineBar {
     this.forward = find("forward", HTMLButtonElement);
     this.previousMark = find("previous-mark", HTMLButtonElement);
     this.nextMark = find("next-mark", HTMLButtonElement);
-    this.marks = new MarkRow((step) => this.track.showMark(step));
+    this.marks = new MarkRow((step) => this.track.showMark(step), () => this.show());
     this.clock = find("clock", HTMLOutputElement);
     // An answer reopens the gate in the next animation frame, once the step has been drawn.
     this.gate = new SeekGate((step, done) => this.track.seek(step, () => requestAnimationFrame(() => {
@@ -83,7 +83,7 @@ export class TimelineBar {
   goToMark(direction) {
     const { track } = this;
     if (!track.isThere || track.place === null) return;
-    const step = stepOfMark(track.marks, track.place, direction);
+    const step = stepOfMark(this.marks.shown(track.marks), track.place, direction);
     if (step !== null) track.showMark(step);
   }
 
@@ -94,7 +94,7 @@ export class TimelineBar {
     this.element.setAttribute("aria-label", track.name === "live" ? "History" : "Recording");
     const reason = this.reasonAgainst();
     for (const control of [this.back, this.forward, this.slider]) enable(control, reason);
-    const reasonOfMarks = reason || (track.marks.length > 0 ? "" : "There are no marks.");
+    const reasonOfMarks = reason || (this.marks.shown(track.marks).length > 0 ? "" : track.marks.length > 0 ? "All marks are switched off in the legend." : "There are no marks.");
     for (const control of [this.previousMark, this.nextMark]) enable(control, reasonOfMarks);
     this.marksMs = 0;
     this.follow(true);

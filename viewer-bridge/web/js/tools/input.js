@@ -4,10 +4,11 @@ import { clamp, length, subtract } from "../geometry/math.js";
 import { BrushTool } from "./brush.js";
 import { CarryTool } from "./carry.js";
 import { CutTool } from "./cut.js";
-import { CLICK_PIXELS, PressTool } from "./press-tool.js";
+import { CLICK_MS, CLICK_PIXELS, PressTool } from "./press-tool.js";
 import { GrabTool } from "./grab.js";
 import { anchorOf, solidAt } from "./objects.js";
-import { togglePin } from "./pin.js";
+import { Notches } from "./notches.js";
+import { togglePin, togglePins } from "./pin.js";
 import { itemAt } from "./select.js";
 import { REACH, depthUnder, particleAt } from "./tool.js";
 import { ViewTool } from "./view.js";
@@ -23,6 +24,8 @@ export const BRUSH = { min: 20, max: 100, step: 10, start: 50 };
 const LONG_PRESS_MS = 550;
 /** Limit on the motion of a press that still counts as at rest, in CSS pixels. */
 const SLACK = 6;
+/** A timer that fires this late was held up, and a release may wait behind it: the finger gets as long again. */
+const LATE_MS = 40;
 /** Exponent of the zoom factor per unit of the wheel; a notch is 100 units. */
 const ZOOM_PER_UNIT = 0.0012;
 /** Limit on particles for hovering, which picks what is under the mouse once per frame. */
@@ -41,6 +44,7 @@ export class Input {
     /** @type {Mode} */
     this.mode = "grab";
     this.brushRadius = BRUSH.start;
+    this.notches = new Notches();
     /** Position of each pressed pointer. @type {Map<number, Pixel>} */
     this.pointers = new Map();
     /** @type {Tool | null} */
@@ -95,13 +99,15 @@ export class Input {
       return;
     }
     this.tool = this.begin(event, at);
+    // The page may have been busy since the press.
+    if (this.tool instanceof PressTool) this.tool.pressedMs = event.timeStamp;
     const isView = this.tool instanceof ViewTool;
     this.click = event.button === 0 && (isView || this.tool instanceof PressTool) && (this.mode === "grab" || !this.canChange()) ? at : null;
     if (!isView) {
       this.touches += 1;
       this.onTouch();
     }
-    if (event.pointerType === "touch" && this.tool instanceof PressTool) this.waitForLongPress(this.tool);
+    if (event.pointerType === "touch" && this.tool instanceof PressTool) this.waitForLongPress(this.tool, event.timeStamp + LONG_PRESS_MS);
     this.app.renderer.isDirty = true;
   }
 
@@ -121,16 +127,22 @@ export class Input {
     return null;
   }
 
-  /** @param {PressTool & Tool} tool */
-  waitForLongPress(tool) {
-    const { particle } = tool;
-    if (particle === null) return;
+  /** Pins the particle of a press that is still at rest at a time. @param {PressTool & Tool} tool @param {number} dueMs */
+  waitForLongPress(tool, dueMs) {
     this.longPress = setTimeout(() => {
-      if (this.tool !== tool || distance(tool.start, tool.pointer) > SLACK) return;
-      this.finish();
-      togglePin(this.app, particle);
-      navigator.vibrate?.(15);
-    }, LONG_PRESS_MS);
+      const now = performance.now();
+      if (now - dueMs > LATE_MS) return this.waitForLongPress(tool, now + LATE_MS);
+      if (this.pinPressed(tool)) globalThis.navigator?.vibrate?.(15);
+    }, Math.max(0, dueMs - performance.now()));
+  }
+
+  /** Ends a press at rest, and pins its particle. Returns false if there is none. @param {PressTool & Tool} tool */
+  pinPressed(tool) {
+    const { particle } = tool;
+    if (this.tool !== tool || particle === null || distance(tool.start, tool.pointer) > SLACK) return false;
+    this.finish();
+    togglePin(this.app, particle);
+    return true;
   }
 
   /** @param {PointerEvent} event */
@@ -161,9 +173,12 @@ export class Input {
   release(event) {
     if (!this.pointers.delete(event.pointerId)) return;
     clearTimeout(this.longPress);
-    const isHeld = this.tool instanceof PressTool && this.tool.isBegun;
-    const click = event.type === "pointerup" && !isHeld ? this.click : null;
+    const { tool } = this;
+    const heldMs = tool instanceof PressTool ? event.timeStamp - tool.pressedMs : 0;
+    const click = event.type === "pointerup" && heldMs <= CLICK_MS ? this.click : null;
     this.click = null;
+    // The timer of a busy page may not have come to it.
+    if (event.type === "pointerup" && event.pointerType === "touch" && tool instanceof PressTool && heldMs >= LONG_PRESS_MS && this.pinPressed(tool)) return;
     this.finish();
     if (click !== null) this.select(click, event);
   }
@@ -219,24 +234,26 @@ export class Input {
     return particle !== null;
   }
 
-  /** Toggles the pin of the particle that is dragged, or of the one under the mouse. Returns false if there is none. */
-  pinHovered() {
-    if (this.tool instanceof PressTool && this.tool.particle !== null) {
-      togglePin(this.app, this.tool.particle);
-      return true;
-    }
-    return this.hover !== null && this.pinAt(this.hover, REACH.mouse);
+  /** Toggles the pin of the particle that is dragged, of those that are selected, or of the one under the mouse. Returns false if there is none. */
+  pinByKey() {
+    const { app, tool } = this;
+    const dragged = tool instanceof PressTool && tool.particle !== null ? [tool.particle] : [];
+    const selected = app.selection.items.flatMap(({ kind, index }) => (kind === "particle" ? [index] : []));
+    const chosen = dragged.length > 0 ? dragged : selected;
+    if (chosen.length === 0 || !this.canChange()) return this.hover !== null && this.pinAt(this.hover, REACH.mouse);
+    togglePins(app, chosen);
+    return true;
   }
 
   /** @param {WheelEvent} event */
   turnWheel(event) {
     event.preventDefault();
     const { camera, renderer } = this.app;
-    const lines = event.deltaMode === WheelEvent.DOM_DELTA_LINE ? 30 : 1;
     if (this.mode === "brush" && !event.ctrlKey) {
-      this.brushRadius = clamp(this.brushRadius - Math.sign(event.deltaY) * BRUSH.step, BRUSH.min, BRUSH.max);
+      this.brushRadius = clamp(this.brushRadius - this.notches.add(event) * BRUSH.step, BRUSH.min, BRUSH.max);
       if (this.tool instanceof BrushTool) this.tool.radius = this.brushRadius;
     } else {
+      const lines = event.deltaMode === WheelEvent.DOM_DELTA_LINE ? 30 : 1;
       // Browsers report a pinch on a touchpad as a wheel with ctrl, in much smaller units.
       const units = clamp(event.deltaY * lines, -300, 300) * (event.ctrlKey ? 5 : 1);
       const at = this.pixel(event);

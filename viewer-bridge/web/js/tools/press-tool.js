@@ -14,7 +14,7 @@ const VELOCITY_MS_MIN = 16;
 
 /** Motion in CSS pixels, and time in ms, from which a press moves something. A shorter one is a click, which changes nothing. */
 export const CLICK_PIXELS = 3;
-const CLICK_MS = 200;
+export const CLICK_MS = 200;
 
 /** Sends a target per animation frame with motion: where the pointer meets the camera-facing plane through a point. */
 export class PressTool {

@@ -2,7 +2,8 @@
 
 import { enable, find } from "./dom.js";
 import { MODES } from "../tools/input.js";
-import { listenToKeys, returnFocus } from "./keys.js";
+import { CharacterKeys, listenToKeys, returnFocus } from "./keys.js";
+import { Question } from "./prompts.js";
 import { SceneLoader } from "./scene-loader.js";
 import { SceneMenu, neighbour } from "./scene-menu.js";
 
@@ -41,7 +42,7 @@ export class Controls {
     /** Called for the key of the picture. */
     this.onPicture = () => {};
     this.listen();
-    listenToKeys(this.keymap());
+    listenToKeys(this.keymap(), new CharacterKeys());
     returnFocus(input.canvas);
     const { simulation } = app;
     this.loader = new SceneLoader(simulation, app.commands);
@@ -85,7 +86,7 @@ export class Controls {
       g: () => this.setMode("grab"),
       b: () => this.setMode("brush"),
       c: () => this.setMode("cut"),
-      p: () => { if (!this.input.pinHovered()) this.setMode("pin"); },
+      p: () => { if (!this.input.pinByKey()) this.setMode("pin"); },
       m: () => this.openMenu(),
       "[": () => this.loadNeighbour(-1),
       "]": () => this.loadNeighbour(1),
@@ -101,7 +102,7 @@ export class Controls {
       t: () => this.onFollow(),
       Escape: () => this.escape(),
     };
-    for (let digit = 1; digit <= 9; digit++) keymap[digit] = () => this.loadNumber(digit - 1);
+    for (let digit = 1; digit <= 9; digit++) keymap[digit] = () => this.openMenu(this.scenes()[digit - 1]?.name);
     return keymap;
   }
 
@@ -157,20 +158,22 @@ export class Controls {
     return this.app.simulation.hello?.scenes ?? [];
   }
 
-  openMenu() {
-    if (!this.scene.disabled) this.menu.open(this.scenes(), this.name());
+  /** Opens the menu of scenes at a card: at that of the present scene without a name. @param {string} [name] */
+  openMenu(name) {
+    if (!this.scene.disabled) this.menu.open(this.scenes(), this.name(), name);
   }
 
-  /** @param {number} index */
-  loadNumber(index) {
-    const scene = this.scenes()[index];
-    if (scene !== undefined && !this.scene.disabled) this.load(scene.name);
-  }
-
-  /** Loads the scene before or after the present one in the list. @param {number} by */
+  /** Loads the scene before or after the present one in the list. Asks first if other pages show it. @param {number} by */
   loadNeighbour(by) {
-    const scene = neighbour(this.scenes(), this.loader.requested ?? this.name(), by);
-    if (scene !== undefined && !this.scene.disabled) this.load(scene.name);
+    const present = this.name();
+    const scene = neighbour(this.scenes(), this.loader.requested ?? present, by);
+    if (scene === undefined || this.scene.disabled) return;
+    const others = (this.app.simulation.stats?.clients ?? 1) - 1;
+    if (others < 1) return this.load(scene.name);
+    new Question().ask(
+      { text: `${others === 1 ? "Another page shows" : `${others} other pages show`} this simulation. Loading “${scene.name}” replaces it for everybody.`, yes: `Load ${scene.name}`, no: `Keep ${present ?? "it"}` },
+      (isYes) => { if (isYes) this.load(scene.name); },
+    );
   }
 
   /** @param {Mode} mode */

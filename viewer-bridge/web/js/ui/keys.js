@@ -1,5 +1,7 @@
 // Keyboard shortcuts: one table from keys to actions.
 
+import { find } from "./dom.js";
+
 /** @typedef {Record<string, () => void>} Keymap  keyed by KeyboardEvent.key, with letters in lower case; "ctrl+" stands before a key with Ctrl or Cmd */
 
 /** Keys that move the choice of a focused list or slider. */
@@ -30,14 +32,37 @@ export function keyName({ key, ctrlKey, metaKey, altKey, shiftKey, repeat }) {
   return shiftKey || repeat ? null : `ctrl+${name}`;
 }
 
-/** @param {Keymap} keymap */
-export function listenToKeys(keymap) {
+/** Key of the choice in localStorage. */
+const CHARACTERS_OFF = "catenary-character-keys-off";
+
+/** True for a key that types a character, as dictation and a slip of the hand do. The space bar and Ctrl with a key are not among them. @param {string} name */
+export const isCharacter = (name) => name.length === 1 && name !== " ";
+
+/** The switch for shortcuts of a single character. Its choice belongs to the browser. */
+export class CharacterKeys {
+  constructor() {
+    this.box = find("character-keys", HTMLInputElement);
+    this.box.checked = localStorage.getItem(CHARACTERS_OFF) === null;
+    this.box.addEventListener("change", () => {
+      if (this.box.checked) localStorage.removeItem(CHARACTERS_OFF);
+      else localStorage.setItem(CHARACTERS_OFF, "");
+    });
+  }
+
+  /** @param {string} name of a pressed key */
+  allows(name) {
+    return this.box.checked || !isCharacter(name);
+  }
+}
+
+/** @param {Keymap} keymap @param {CharacterKeys} characters */
+export function listenToKeys(keymap, characters) {
   // A click on the picture focuses it too, but only focus by Tab shows the focus ring.
   document.addEventListener("pointerdown", () => { delete document.documentElement.dataset.tabbed; });
   document.addEventListener("keydown", (event) => {
     if (event.key === "Tab") document.documentElement.dataset.tabbed = "";
     const name = keyName(event);
-    if (name === null) return;
+    if (name === null || !characters.allows(name)) return;
     const control = event.target instanceof Element ? event.target.closest("button, input, select, textarea") : null;
     if (document.querySelector("dialog[open]") !== null || (control !== null && isConsumed(/** @type {HTMLInputElement} */ (control), event.key))) return;
     const action = keymap[name];

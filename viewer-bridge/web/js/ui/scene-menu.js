@@ -32,15 +32,16 @@ export class SceneMenu {
     this.list.addEventListener("keydown", (event) => this.move(event));
   }
 
-  /** @param {SceneEntry[]} scenes @param {string | null} current */
-  open(scenes, current) {
+  /** Opens the menu with the focus on a card: that of the current scene, unless another one is asked for.
+   * @param {SceneEntry[]} scenes @param {string | null} current @param {string | null} [focused] */
+  open(scenes, current, focused = current) {
     this.build(scenes);
     for (const card of this.cards()) {
       if (card.dataset.scene === current) card.setAttribute("aria-current", "true");
       else card.removeAttribute("aria-current");
     }
     this.dialog.showModal();
-    (this.cards().find((card) => card.dataset.scene === current) ?? this.cards()[0])?.focus();
+    (this.cards().find((card) => card.dataset.scene === focused) ?? this.cards()[0])?.focus();
   }
 
   cards() {

@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { clock, describe, isRunning, losses, readableBytes, reasonAgainst, replayAddress } from "../../js/save/recording-text.js";
+import { clock, describe, endsAfterMs, isRunning, losses, readableBytes, reasonAgainst, replayAddress } from "../../js/save/recording-text.js";
 
 const RECORDING = { type: "recording", state: "recording", text: "", name: null, path: null, seconds: 83.9, snapshots: 2937, size_bytes: 8_123_456, lost: {} };
 const LIVE = { isConnected: true, isReplay: false, hasNode: true };
@@ -55,4 +55,11 @@ test("the address of a recording is relative and carries the token", () => {
   const address = (/** @type {string | null} */ token) => new URL(replayAddress("curtain_1", token), "http://host:8080/").href;
   assert.equal(address(null), "http://host:8080/replay/curtain_1/");
   assert.equal(address("a b"), "http://host:8080/replay/curtain_1/#token=a%20b");
+});
+
+test("a finished recording leaves the other pages, but not the one that asked for it, and a failure stays", () => {
+  const finished = { ...RECORDING, state: "finished" };
+  assert.equal(endsAfterMs(finished, true), Infinity);
+  assert.ok(endsAfterMs(finished, false) < 60_000);
+  assert.equal(endsAfterMs({ ...RECORDING, state: "failed" }, false), Infinity);
 });

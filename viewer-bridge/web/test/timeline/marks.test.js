@@ -2,7 +2,7 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { describe, marksAt, stepOfMark } from "../../js/timeline/marks.js";
+import { describe, legendOf, marksAt, stepOfMark } from "../../js/timeline/marks.js";
 import { addressBeside } from "../../js/timeline/replay-track.js";
 import { Scale, clockText, zoomed } from "../../js/timeline/timeline.js";
 
@@ -50,4 +50,9 @@ test("a zoomed timeline stays until the place leaves it, and never leaves the re
   assert.deepEqual(zoomed(whole, part, 1100, 200), { first: 900, last: 1100 });
   assert.deepEqual(zoomed(whole, part, 100, 200), { first: 100, last: 300 });
   assert.deepEqual(zoomed(whole, part, 500, 20), { first: 495, last: 515 });
+});
+
+test("the legend counts the events of each kind, in a fixed order", () => {
+  const more = [...marks, { kind: "ghost", step: 400, count: 1 }, { kind: "tear", step: 500, count: 2 }];
+  assert.deepEqual(legendOf(more).map(({ kind, text }) => [kind, text]), [["tear", "torn 5"], ["pin", "pins 1"], ["command", "commands 9"], ["late", "late steps 1"], ["ghost", "first difference"]]);
 });

@@ -99,8 +99,9 @@ test("a press that lasts carries, and a click on a solid sends nothing", () => {
   at(page, "pointerup");
   assert.deepEqual([page.sent, page.selection.items], [[], []]);
   at(page, "pointerdown");
-  page.input.tick(page.input.tool.pressedMs + 250);
-  at(page, "pointerup");
+  const { pressedMs } = page.input.tool;
+  page.input.tick(pressedMs + 250);
+  at(page, "pointerup", 0, 0, { timeStamp: pressedMs + 250 });
   assert.deepEqual(types(page), ["lift", "throw"]);
   assert.deepEqual(page.sent[1].velocity, [0, 0, 0]);
 });
@@ -220,11 +221,11 @@ test("a click selects an anchored particle, and P pins it while it is carried", 
   at(page, "pointerup");
   assert.deepEqual([page.sent, page.selection.items], [[], [{ kind: "particle", index: 0 }]]);
   at(page, "pointerdown");
-  assert.ok(page.input.pinHovered());
+  assert.ok(page.input.pinByKey());
   assert.deepEqual(types(page), ["pin"]);
   const solid = shown([SPHERE]);
   at(solid, "pointerdown");
-  assert.ok(!solid.input.pinHovered());
+  assert.ok(!solid.input.pinByKey());
 });
 
 test("a recording, another mode and the keys of the view carry nothing", () => {

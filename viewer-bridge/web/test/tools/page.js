@@ -39,6 +39,6 @@ export function pageOf(scene, canChange = true) {
     positions: scene.positions, nonFinite: new Uint32Array(0),
   });
   const { x, y } = camera.project([0, 0, 0], VIEWPORT);
-  const event = { pointerId: 1, pointerType: "mouse", button: 0, clientX: x, clientY: y };
+  const event = { pointerId: 1, pointerType: "mouse", button: 0, clientX: x, clientY: y, get timeStamp() { return performance.now(); } };
   return { app, input, simulation, camera, commands, sent, canvas, listeners, event, selection: app.selection };
 }
