@@ -20,6 +20,8 @@ const STRAIN_MIN = 0.002;
 const SPEED_MIN_RADII = 0.005;
 /** Ends that a user can choose, in the unit of the quantity. @type {Record<Quantity, number[]>} */
 const ENDS = { strain: [0.01, 0.05, 0.2, 1], tension: [0.1, 1, 10, 100], speed: [0.1, 1, 10], kind: [] };
+/** An end that is smaller than this part of the other one is noise: the scale begins at 0. */
+const NOISE_SHARE = 0.02;
 /** The rounding of positions is mentioned from this part of the scale on. */
 const RESOLUTION_SHARE = 0.05;
 
@@ -37,8 +39,9 @@ export class ColorLegend {
     this.note = find("heat-note", HTMLElement);
     this.scan = new ValueScan();
     this.begunMs = -Infinity;
-    /** The end of the automatic scale. */
-    this.end = 0;
+    /** The ends of the automatic scale, as magnitudes. */
+    this.low = new ScaleEnd();
+    this.high = new ScaleEnd();
     /** The frame of the last scan: a paused scene is scanned once. @type {object | null} */
     this.scanned = null;
     /** The inputs from which the gains of the topology were computed. */
@@ -69,9 +72,10 @@ export class ColorLegend {
   /** Starts with another scene or quantity. */
   begin() {
     const { quantity } = this;
-    this.end = 0;
+    this.low = new ScaleEnd();
+    this.high = new ScaleEnd();
     this.gainsFor = "";
-    this.range.replaceChildren(make("option", { value: "auto" }, "auto"), ...ENDS[quantity].map((end) => make("option", { value: end }, `${quantity === "speed" ? "to" : "±"} ${readable(end, this.unit())}`)));
+    this.range.replaceChildren(make("option", { value: "auto" }, "auto"), ...ENDS[quantity].map((end) => make("option", { value: end }, `to ${readable(end, this.unit())}`)));
     this.range.hidden = quantity === "kind";
     this.updateGains();
     this.rescan();
@@ -138,16 +142,15 @@ export class ColorLegend {
     if (isDone) this.fit();
   }
 
-  /** Sets the ends of the scale: those chosen, or a round number above 98 of 100 values. Hysteresis keeps them steady. */
+  /** Sets the ends of the scale: those chosen, or round numbers around 98 of 100 values. */
   fit() {
     const { coloring } = this.app.renderer;
-    const measured = Math.max(this.scan.found?.most ?? 0, this.least());
-    if (measured > this.end || measured < this.end * 0.3) this.end = niceCeiling(measured);
-    const end = this.range.value === "auto" ? this.end : Number(this.range.value);
-    const low = this.quantity === "speed" ? 0 : -end;
-    if (coloring.low !== low || coloring.high !== end) this.app.renderer.isDirty = true;
-    coloring.low = low;
-    coloring.high = end;
+    const { low, high } = this.scan.found ?? { low: 0, high: 0 };
+    this.low.follow(-low);
+    this.high.follow(-low > this.least() ? high : Math.max(high, this.least()));
+    const scale = scaleOf(this.low.value, this.high.value, this.range.value === "auto" ? null : Number(this.range.value));
+    if (coloring.low !== scale.low || coloring.high !== scale.high) this.app.renderer.isDirty = true;
+    Object.assign(coloring, scale);
     this.show();
   }
 
@@ -168,9 +171,8 @@ export class ColorLegend {
     const { low, high } = this.app.renderer.coloring;
     const unit = this.unit();
     const [first, middle, last] = this.ends.children;
-    setText(first, low === 0 ? "0" : `${readable(low, unit)}`);
-    setText(middle, low === 0 ? "" : "0");
-    setText(last, readable(high, unit));
+    const texts = [low, (low + high) / 2, high].map((value) => (value === 0 ? "0" : readable(value, unit)));
+    [first, middle, last].forEach((one, place) => setText(one, texts[place]));
     const { found } = this.scan;
     if (found !== null) setText(this.extremes, found.known === 0 ? "no known value" : `min ${readable(found.min, unit)}, max ${readable(found.max, unit)}`);
     else setText(this.extremes, "");
@@ -207,6 +209,28 @@ export class ColorLegend {
       return [make("li", {}, swatch, `${name}: ${counts[kind]}`)];
     }));
   }
+}
+
+/** An end of a scale: a round number. It grows at once, and shrinks only when less than a third is used. */
+class ScaleEnd {
+  constructor() {
+    this.value = 0;
+  }
+
+  /** @param {number} measured */
+  follow(measured) {
+    if (measured > this.value || measured < this.value * 0.3) this.value = measured > 0 ? niceCeiling(measured) : 0;
+  }
+}
+
+/**
+ * The scale from the magnitudes of the automatic ends, with 0 in it. A chosen end holds for the sides that have values.
+ * @param {number} below @param {number} above @param {number | null} chosen
+ */
+export function scaleOf(below, above, chosen) {
+  const isBelow = below > NOISE_SHARE * above;
+  const isAbove = above > NOISE_SHARE * below || !isBelow;
+  return { low: isBelow ? -(chosen ?? below) : 0, high: isAbove ? chosen ?? (above || 1) : 0 };
 }
 
 /** Says of which constraints the tension is known. @param {Extremes} found @param {string | null} method */

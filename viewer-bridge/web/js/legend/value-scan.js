@@ -1,27 +1,29 @@
-// Finds the least and greatest value of the picture's quantity, and the end of its scale. A large scene is
+// Finds the least and greatest value of the picture's quantity, and the ends of its scale. A large scene is
 // scanned in slices, one per animation frame, but always in one frame of the simulation.
 
 import { valueAt } from "../state/quantity.js";
 
 /** @typedef {import("../net/wire.js").Frame} Frame */
-/** Extremes of the known values; `most` is the 98th percentile of their magnitudes, and `resolution` what the
+/** Extremes of the known values; 98 of 100 lie between `low` and `high`, which include 0. `resolution` is what the
  * rounding of the positions can change in a value.
- * @typedef {{ min: number, max: number, most: number, known: number, count: number, resolution: number }} Extremes */
+ * @typedef {{ min: number, max: number, low: number, high: number, known: number, count: number, resolution: number }} Extremes */
 
 /** Values per slice: well below a millisecond. */
 const SLICE = 10_000;
-/** Part of the values within the scale. The rest exceeds it: one edge at a pin can be stretched far more than all others. */
-const PERCENTILE = 0.98;
+/** Part of the values beyond each end of the scale: one edge at a pin can be stretched far more than all others. */
+const BEYOND = 0.01;
 /** Bits of a float that a class of the histogram ignores: its width is 1/128 of its value. */
 const CLASS_SHIFT = 16;
+/** Number of the classes of one sign. */
+const CLASSES = 0x8000;
 
 const floats = new Float32Array(1);
 const bits = new Uint32Array(floats.buffer);
 
 export class ValueScan {
   constructor() {
-    /** Numbers of magnitudes, by the upper bits of a positive float. */
-    this.classes = new Uint32Array(0x8000);
+    /** Numbers of values by the upper bits of a float: the classes of positive values by magnitude, then of negative ones. */
+    this.classes = new Uint32Array(2 * CLASSES);
     /** @type {Frame | null} */
     this.frame = null;
     /** @type {Extremes | null} */
@@ -81,8 +83,8 @@ export class ValueScan {
     this.known++;
     if (value < this.min) this.min = value;
     if (value > this.max) this.max = value;
-    floats[0] = Math.abs(value);
-    this.classes[bits[0] >> CLASS_SHIFT]++;
+    floats[0] = value;
+    this.classes[bits[0] >>> CLASS_SHIFT]++;
   }
 
   /** @param {number} end @param {number} count */
@@ -91,18 +93,23 @@ export class ValueScan {
     if (end < count) return false;
     const { isQuantised, scale } = /** @type {Frame} */ (this.frame);
     const resolution = isQuantised ? Math.hypot(...scale) * this.gainMax : 0;
-    this.found = { min: this.min, max: this.max, most: this.percentile(), known: this.known, count, resolution };
+    this.found = { min: this.min, max: this.max, low: 0 - this.end(CLASSES, -this.min), high: this.end(0, this.max), known: this.known, count, resolution };
     this.frame = null;
     return true;
   }
 
-  /** The magnitude that a fiftieth of the values exceed, up to the width of a class; 0 without values. */
-  percentile() {
-    let left = Math.ceil(PERCENTILE * this.known);
-    if (left === 0) return 0;
-    let index = 0;
-    while (left > this.classes[index]) left -= this.classes[index++];
-    bits[0] = (index + 1) << CLASS_SHIFT;
-    return Math.min(floats[0], Math.max(Math.abs(this.min), Math.abs(this.max)));
+  /** The magnitude of one sign that a hundredth of all values exceed, up to the width of a class; 0 if fewer have that sign.
+   * @param {number} first class of that sign @param {number} greatest magnitude */
+  end(first, greatest) {
+    let left = Math.floor(BEYOND * this.known);
+    for (let index = CLASSES - 1; index >= 0; index--) {
+      const count = this.classes[first + index];
+      if (count > left) {
+        bits[0] = (index + 1) << CLASS_SHIFT;
+        return Math.min(floats[0], Math.max(greatest, 0));
+      }
+      left -= count;
+    }
+    return 0;
   }
 }

@@ -5,7 +5,7 @@ import { test } from "node:test";
 import { complianceOf, strainGains, tensionGains, valueAt } from "../../js/state/quantity.js";
 import { ValueScan } from "../../js/legend/value-scan.js";
 import { Topology, FAN_WORDS } from "../../js/state/topology.js";
-import { tensionNote } from "../../js/legend/color-legend.js";
+import { scaleOf, tensionNote } from "../../js/legend/color-legend.js";
 import { unitIn, unitsOf } from "../../js/ui/units.js";
 
 /** Constraints along the x axis from particle 0, with given lengths. */
@@ -49,15 +49,36 @@ test("tension is the elongation over the compliance, and not known of a rigid co
   assert.equal(complianceOf(one, [null, 0.25, null, null], 2), 0.25);
 });
 
-test("the scale ends at 98 of 100 magnitudes, and the extremes are exact", () => {
+test("98 of 100 values lie on the scale, on either side of 0, and the extremes are exact", () => {
   const count = 1000;
   const one = scene({ restLengths: new Array(count).fill(1), compliances: new Array(count).fill(0) });
   const lengths = Array.from({ length: count }, (_, i) => (i === 3 ? 9 : i === 5 ? 0.2 : 1 + i / 10_000));
   const found = scanned(one, strainGains(one), lengths);
   near(found.max, 8);
   near(found.min, -0.8);
-  assert.ok(found.most >= 0.0975 && found.most < 0.0995, `${found.most}`);
+  assert.ok(found.high >= 0.0985 && found.high < 0.0999, `${found.high}`);
+  assert.equal(found.low, 0, "one value of 1000 is compressed");
   assert.deepEqual([found.known, found.count, found.resolution], [count, count, 0]);
+});
+
+test("each side of 0 has its own end", () => {
+  const count = 1000;
+  const one = scene({ restLengths: new Array(count).fill(1), compliances: new Array(count).fill(0) });
+  // A tenth is compressed by up to 1 %, the rest is stretched by up to 20 %.
+  const lengths = Array.from({ length: count }, (_, i) => (i < 100 ? 1 - i / 10_000 : 1 + (i - 100) / 4500));
+  const { low, high } = scanned(one, strainGains(one), lengths);
+  assert.ok(low > -0.01 && low < -0.0089, `${low}`);
+  assert.ok(high > 0.197 && high < 0.2, `${high}`);
+});
+
+test("a scale wastes no side that has no values", () => {
+  assert.deepEqual(scaleOf(0, 20, null), { low: 0, high: 20 });
+  assert.deepEqual(scaleOf(0.1, 20, null), { low: 0, high: 20 }, "noise");
+  assert.deepEqual(scaleOf(5, 20, null), { low: -5, high: 20 });
+  assert.deepEqual(scaleOf(5, 0.01, null), { low: -5, high: 0 });
+  assert.deepEqual(scaleOf(5, 20, 1), { low: -1, high: 1 });
+  assert.deepEqual(scaleOf(0, 20, 1), { low: 0, high: 1 });
+  assert.deepEqual(scaleOf(0, 0, null), { low: 0, high: 1 });
 });
 
 test("a large scene is scanned in slices of one frame, and the rounding of its positions is known", () => {
