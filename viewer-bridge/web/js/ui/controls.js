@@ -9,8 +9,8 @@ import { SceneMenu, neighbour } from "./scene-menu.js";
 
 /** @typedef {import("../tools/input.js").Mode} Mode */
 
-/** Below this width the panel covers the picture, so it is hidden at first. */
-const PANEL_BESIDE_MIN = "(min-width: 761px)";
+/** In a smaller window the panel covers much of the picture, so it is hidden at first. */
+const PANEL_BESIDE_MIN = "(min-width: 761px) and (min-height: 521px)";
 /** Motion of the view per arrow key, in CSS pixels, and zoom factor of the + key. */
 const KEY_PIXELS = 30;
 const KEY_ZOOM = 1.2;
@@ -59,6 +59,9 @@ export class Controls {
     find("link", HTMLButtonElement).addEventListener("click", () => this.views.copyLink());
     find("help", HTMLButtonElement).addEventListener("click", () => this.help.showModal());
     this.panelToggle.addEventListener("click", () => this.togglePanel());
+    const more = find("more", HTMLButtonElement);
+    more.addEventListener("click", () => unfold(more, more.getAttribute("aria-expanded") !== "true"));
+    this.input.canvas.addEventListener("pointerdown", () => unfold(more, false));
     this.help.addEventListener("click", (event) => { if (event.target === this.help) this.help.close(); });
     if (!matchMedia(PANEL_BESIDE_MIN).matches) this.togglePanel();
   }
@@ -215,6 +218,12 @@ export class Controls {
     // A menu that cannot load anything closes.
     if (this.scene.disabled) this.menu.dialog.close();
   }
+}
+
+/** Shows the controls that small screens fold away, or folds them. @param {HTMLButtonElement} more @param {boolean} isOn */
+function unfold(more, isOn) {
+  more.setAttribute("aria-expanded", String(isOn));
+  document.body.classList.toggle("is-unfolded", isOn);
 }
 
 /** @param {HTMLButtonElement} button @param {string} text */
