@@ -81,6 +81,8 @@ export class SceneBuffers {
     this.flatPlaces = hasEffects ? new ArrayTexture(gl, UNITS.u_flat_places, formats.f32x2, scene.particleCount) : null;
     if (scene.particleCount > 0) this.flatPlaces?.write(layFlat(topology));
     drawables.sticks.setSticks(topology, drawnSticks(scene, STICKS_MAX), hasEffects ? this.radii() : new Float32Array(scene.constraintCount));
+    /** Typical distance between neighbouring marks. */
+    this.markGap = Infinity;
     /** Created for the first state of a ghost. @type {GhostSticks | null} */
     this.ghost = null;
     this.writeTopology(true);
@@ -146,6 +148,7 @@ export class SceneBuffers {
   writeMarks() {
     const { points } = this.drawables;
     const marks = [...this.simulation.pins].map(([particle, flags]) => [particle, markStyle(flags)]);
+    this.markGap = gapOf(this.scene.positions, [...this.simulation.pins.keys()]);
     const isGrabbed = (/** @type {number[]} */ [, style]) => style === POINT.grabbed;
     points.marks.set(new Uint32Array(marks.filter((mark) => !isGrabbed(mark)).flat()));
     points.grabbed.set(new Uint32Array(marks.filter(isGrabbed).flat()));
@@ -173,6 +176,15 @@ function markStyle(flags) {
   if (flags & PIN.frozen) return POINT.frozen;
   if (flags & PIN.grabbed) return POINT.grabbed;
   return flags & PIN.pinned ? POINT.pin : POINT.anchor;
+}
+
+/** The typical distance between a particle and the next one: the median in the order of their indices, in which the particles
+ * of a row or of a pole follow each other. Infinity without two.
+ * @param {ArrayLike<number>} positions @param {number[]} particles */
+export function gapOf(positions, particles) {
+  const ordered = [...particles].sort((a, b) => a - b);
+  const gaps = ordered.slice(1).map((to, k) => Math.hypot(...[0, 1, 2].map((axis) => positions[3 * to + axis] - positions[3 * ordered[k] + axis])));
+  return gaps.sort((a, b) => a - b)[gaps.length >> 1] ?? Infinity;
 }
 
 /** @param {Float32Array} lengths @param {number} fallback */

@@ -13,7 +13,7 @@ import { SharedUniforms } from "./uniforms.js";
  * @typedef {{
  *   gl: WebGL2RenderingContext, canvas: HTMLCanvasElement, viewport: import("../geometry/camera.js").Viewport,
  *   camera: import("../geometry/camera.js").Camera, simulation: import("../state/simulation.js").Simulation,
- *   isDark: boolean, coloring: { low: number, high: number }, buffers?: { spacing: number } | null,
+ *   isDark: boolean, coloring: { low: number, high: number }, buffers?: { spacing: number, markGap: number } | null,
  *   toggles: { surface: boolean, sticks: boolean, heat: boolean, shadow: boolean },
  *   hasEffects(): boolean, hasSurface(): boolean, paint(): number,
  * }} Picture */
@@ -35,6 +35,13 @@ const ONES = [1, 1, 1];
 /** Offset of the ground plane in a scene without one: below everything. */
 const ABYSS = -1e9;
 
+/** Least radius of the mark of a particle in CSS pixels. Marks that are close together become smaller, so that they neither
+ * merge into a bar nor hide what they hold. @param {number} count of particles @param {number} gap between marks in CSS pixels */
+export function markRadius(count, gap) {
+  const most = count > 2000 ? 4 : 5.5;
+  return Math.min(most, Math.max(1.6, gap * 0.4));
+}
+
 export class PictureUniforms {
   /** @param {Picture} picture */
   constructor(picture) {
@@ -48,6 +55,7 @@ export class PictureUniforms {
       sticks: { u_radius: 0, u_radius_min: 0, u_opacity: 1, u_is_all: 1 },
       particles: { u_radius: 0, u_radius_min: 0 },
       marks: { u_radius: 0, u_radius_min: 0 },
+      grabbed: { u_radius: 0, u_radius_min: 0 },
     };
     /** The matrix of the picture, in doubles. */
     this.viewProjection = identity();
@@ -168,7 +176,7 @@ export class PictureUniforms {
    * sticks are drawn how opaque. */
   setSceneStyles() {
     const { buffers, camera, canvas, simulation, toggles, viewport } = this.picture;
-    const { sticks, particles, marks } = this.sceneStyles;
+    const { sticks, particles, marks, grabbed } = this.sceneStyles;
     const hasSurface = this.picture.hasSurface();
     const ratio = canvas.height / viewport.height;
     const spacing = buffers?.spacing ?? simulation.radius() * 0.5;
@@ -180,8 +188,10 @@ export class PictureUniforms {
     sticks.u_radius_min = (hasSurface ? 0.6 : 1.1) * ratio;
     sticks.u_opacity = hasSurface && !camera.isFlat ? 0.75 : 1;
     sticks.u_is_all = isAll ? 1 : 0;
-    particles.u_radius = marks.u_radius = hasSurface ? 0 : thick * 1.5;
+    particles.u_radius = marks.u_radius = grabbed.u_radius = hasSurface ? 0 : thick * 1.5;
     particles.u_radius_min = (hasSurface ? 1.8 : count < 20 ? 6 : 2.4) * ratio;
-    marks.u_radius_min = (count > 2000 ? 4 : 5.5) * ratio;
+    grabbed.u_radius_min = markRadius(count, Infinity) * ratio;
+    const gap = (buffers?.markGap ?? Infinity) / camera.unitsPerPixel(camera.target, viewport);
+    marks.u_radius_min = markRadius(count, gap) * ratio;
   }
 }

@@ -355,7 +355,7 @@ export class Renderer {
     points.draw(points.marks, sceneStyles.marks, styles.marks);
     // A grabbed particle stays visible behind a fold.
     this.gl.disable(this.gl.DEPTH_TEST);
-    points.draw(points.grabbed, sceneStyles.marks, styles.marks);
+    points.draw(points.grabbed, sceneStyles.grabbed, styles.marks);
   }
 
   drawForces() {

@@ -40,8 +40,9 @@ float value_of(float span, float rest_length, float gain) {
 }
 `;
 
-/** Defines lit(base, at, normal, to_eye, sheen, sun): a soft sky, one key light with a wrapped edge, light through thin cloth, a rim.
- * `sun` is the part of the key light that arrives, 0..=1. */
+/** Defines lit(base, at, normal, to_eye, sheen, sun): a soft sky, one key light with a wrapped edge, light through thin cloth, and
+ * the fibres that catch light at a grazing angle. `sun` is the part of the key light that arrives, 0..=1. In a fold, the normal
+ * between two vertices can turn away from the eye: there is no grazing light, which would be a grey smear. */
 export const LIGHT = `
 vec3 lit(vec3 base, vec3 at, vec3 normal, vec3 to_eye, float sheen, float sun) {
   vec3 to_light = normalize(u_lamp - at);
@@ -51,8 +52,9 @@ vec3 lit(vec3 base, vec3 at, vec3 normal, vec3 to_eye, float sheen, float sun) {
   float through = clamp(-facing, 0.0, 1.0) * 0.12 * sheen;
   vec3 color = base * (around * 0.42 + u_key * sun * (direct + through));
   float gloss = pow(clamp(dot(normal, normalize(to_light + to_eye)), 0.0, 1.0), 28.0);
-  float rim = pow(1.0 - clamp(dot(normal, to_eye), 0.0, 1.0), 4.0);
-  return color + sheen * u_key * (gloss * 0.07 * sun + rim * 0.08 * u_sky);
+  float toward = dot(normal, to_eye);
+  float rim = pow(1.0 - clamp(toward, 0.0, 1.0), 4.0) * smoothstep(0.0, 0.3, toward) * clamp(facing + 0.5, 0.0, 1.0);
+  return color + sheen * u_key * sun * (gloss * 0.07 + rim * 0.3 * base);
 }
 `;
 

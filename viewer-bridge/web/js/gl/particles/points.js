@@ -59,7 +59,8 @@ void main() {
     o_color = screen(base * mix(1.0, light, u_round * smoothstep(5.0, 9.0, v_diameter)), alpha);
     return;
   }
-  float ring = smoothstep(0.62 - soft, 0.62, away);
+  // A small mark is all disc: rings side by side would be a white bar.
+  float ring = smoothstep(0.62 - soft, 0.62, away) * smoothstep(6.0, 10.0, v_diameter);
   o_color = screen(mix(u_marks[int(v_style) - 1], u_ring, ring), alpha);
 }
 `;
