@@ -2,7 +2,7 @@
 
 use serde_json::json;
 
-use crate::support::{Area, Rig};
+use crate::support::{Area, Button, Rig};
 
 /// Counts the controls that are visible and match a condition on `one` and its rectangle `box`.
 fn controls(rig: &Rig, condition: &str) -> f64 {
@@ -20,9 +20,49 @@ fn a_phone_can_fit_the_view_and_hit_every_button() {
     let phone = json!({ "width": 390, "height": 800, "deviceScaleFactor": 1, "mobile": true });
     rig.tab.call("Emulation.setDeviceMetricsOverride", phone);
     rig.tab.wait("innerWidth === 390");
+    rig.tab.click("#more");
     assert_eq!(controls(&rig, "one.id === 'frame' && box.right <= innerWidth"), 1.0);
     assert!(controls(&rig, "one.type === 'checkbox'") > 3.0);
     assert_eq!(controls(&rig, "Math.min(box.width, box.height) < 24"), 0.0);
+}
+
+#[test]
+#[ignore = "needs Chromium"]
+fn the_picture_has_most_of_a_small_window_and_nothing_scrolls_out_of_it() {
+    let rig = Rig::new(&["curtain", "--paused"], "");
+    for [width, height] in [[844, 390], [667, 320], [360, 640], [1366, 480], [1366, 768]] {
+        let window =
+            json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": false });
+        rig.tab.call("Emulation.setDeviceMetricsOverride", window);
+        rig.tab.wait(&format!("innerWidth === {width} && innerHeight === {height}"));
+        let stage = "document.querySelector('#stage').getBoundingClientRect().height";
+        let share = rig.tab.number(&format!("{stage} / innerHeight"));
+        assert!(share > 0.65, "{share} of {width} x {height}");
+        // A document that is taller than the window would scroll when a control in the panel gets the focus.
+        rig.tab.evaluate("document.querySelector('#solver').scrollIntoView()");
+        let top = "document.querySelector('.bar').getBoundingClientRect().top";
+        assert_eq!(rig.tab.number(top), 0.0);
+        assert_eq!(
+            rig.tab.number("document.documentElement.scrollHeight - innerHeight"),
+            0.0,
+            "{width} x {height}"
+        );
+    }
+    // What is folded unfolds over the picture, and folds when the picture is pressed.
+    rig.tab.call(
+        "Emulation.setDeviceMetricsOverride",
+        json!({ "width": 360, "height": 640, "deviceScaleFactor": 1, "mobile": false }),
+    );
+    rig.tab.wait("innerWidth === 360");
+    let is_shown = "document.querySelector('#frame').checkVisibility()";
+    assert_eq!(rig.tab.evaluate(is_shown), false);
+    rig.tab.click("#more");
+    rig.tab.wait(is_shown);
+    let area = rig.tab.camera().area();
+    let at = [area.x + 20.0, area.y + area.height - 20.0];
+    rig.tab.press(at, Button::Left);
+    rig.tab.release(at);
+    rig.tab.wait(&format!("!{is_shown}"));
 }
 
 /// Shows every message over the picture at once, and returns the rectangles of the messages and of the stage.

@@ -126,7 +126,7 @@ pub(super) fn command(named: &NamedValue) -> Result<Command, Reason> {
         }
         _ => return Err(Reason::OutOfRange),
     };
-    Ok(Command::Set { parameter: name.to_owned(), value, constraint_kind, block })
+    Ok(Command::Set { parameter: name.to_owned(), value, constraint_kind, block, stroke: None })
 }
 
 #[allow(clippy::cast_possible_truncation, reason = "the value is rounded once, here")]
@@ -200,6 +200,7 @@ mod tests {
             value,
             constraint_kind,
             block: None,
+            stroke: None,
         };
         let axes = vec![
             FoxgloveValue::Integer(0),
@@ -218,7 +219,10 @@ mod tests {
         assert_eq!(command, Ok(set("stiffness", value, kind)));
         let command = command_for("bending.12", FoxgloveValue::Float64(0.5));
         let (parameter, block) = ("bending".to_owned(), Some(12));
-        assert_eq!(command, Ok(Command::Set { parameter, value, constraint_kind: None, block }));
+        assert_eq!(
+            command,
+            Ok(Command::Set { parameter, value, constraint_kind: None, block, stroke: None })
+        );
     }
 
     #[test]

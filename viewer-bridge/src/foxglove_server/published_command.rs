@@ -40,7 +40,7 @@ pub fn parse(payload: &[u8], epoch: u32) -> Result<Command, String> {
         }
         Action::Set { parameter, value, constraint_kind, block } => {
             let parameter = parameter.as_str().to_owned();
-            Command::Set { parameter, value, constraint_kind, block }
+            Command::Set { parameter, value, constraint_kind, block, stroke: None }
         }
         Action::Load { scene } => Command::Load { scene: scene.as_str().to_owned() },
         Action::Mark { text } => Command::Mark { text: text.as_str().to_owned() },

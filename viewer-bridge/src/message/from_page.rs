@@ -186,6 +186,9 @@ pub enum Command {
         constraint_kind: Option<KindFilter>,
         #[serde(default)]
         block: Option<u32>,
+        /// Changes with the same number are undone together.
+        #[serde(default)]
+        stroke: Option<u32>,
     },
     Mark {
         text: String,
@@ -400,6 +403,7 @@ mod tests {
             value: ParameterValue::Off,
             constraint_kind: None,
             block: None,
+            stroke: None,
         };
         assert_eq!(FromPage::parse(text), Ok(FromPage::Command { id: None, command }));
         assert!(FromPage::parse(r#"{"type":"set","parameter":"tear_force"}"#).is_err());

@@ -296,6 +296,8 @@ pub enum Undoable {
     Cut,
     /// A reset.
     Reset,
+    /// A change of parameters.
+    Set,
     /// A load of a scene.
     Load,
     /// Going on from an earlier state.
@@ -313,6 +315,7 @@ impl Undoable {
             Self::Unpin => "the removal of a pin",
             Self::Cut => "the cut",
             Self::Reset => "the reset",
+            Self::Set => "the change of parameters",
             Self::Load => "the load of another scene",
             Self::Rewind => "the jump to an earlier state",
         }

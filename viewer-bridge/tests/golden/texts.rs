@@ -166,7 +166,7 @@ const FROM_PAGE: [&str; 42] = [
     r#"{"type":"reset"}"#,
     r#"{"type":"load","scene":"rope"}"#,
     r#"{"type":"set","parameter":"gravity","value":[0,-1.62,0]}"#,
-    r#"{"type":"set","parameter":"tear_force","value":null}"#,
+    r#"{"type":"set","parameter":"tear_force","value":null,"stroke":4}"#,
     r#"{"type":"set","parameter":"compliance","value":0.0001,"constraint_kind":"shear"}"#,
     r#"{"type":"look","step":1200,"toward":"after"}"#,
     r#"{"type":"rewind","to_step":1200}"#,

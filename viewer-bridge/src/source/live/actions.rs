@@ -60,7 +60,7 @@ pub(super) fn actions(
         Command::Mark { text } => {
             Action::Mark { text: Text::new(&text).map_err(|_| Reason::OutOfRange)? }
         }
-        Command::Set { parameter, value, constraint_kind, block } => {
+        Command::Set { parameter, value, constraint_kind, block, stroke: _ } => {
             let parameter = Text::new(&parameter).map_err(|_| Reason::UnknownParameter)?;
             Action::Set { parameter, value, constraint_kind, block }
         }

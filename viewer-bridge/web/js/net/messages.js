@@ -30,7 +30,7 @@
  *   type: "recording", state: "unavailable" | "idle" | "recording" | "finishing" | "finished" | "failed", text: string, name: string | null,
  *   path: string | null, seconds: number, snapshots: number, size_bytes: number, lost: Record<string, number>,
  * }} RecordingMessage
- * @typedef {"drag" | "carry" | "brush" | "pin" | "unpin" | "cut" | "reset" | "load" | "rewind"} Undoable
+ * @typedef {"drag" | "carry" | "brush" | "pin" | "unpin" | "cut" | "reset" | "set" | "load" | "rewind"} Undoable
  * @typedef {{ type: "undoable", what: Undoable | null }} UndoableMessage
  * @typedef {Hello | NodeState | Parameters | OutcomeMessage | TimelineMessage | Playback | GhostMessage | HistoryMessage | UndoableMessage | RecordingMessage | { type: "clients", count: number }
  *   | { type: "reset", step: number } | { type: "notice", level: string, text: string }} TextMessage

@@ -6,6 +6,7 @@ import { find, make } from "../ui/dom.js";
 import { SLIDER_STEPS, editable, hasBends, partsOf, positionOf, rangeOf, restoring, rowsOf, unitOf, valueAt, vectorOf } from "./parameters.js";
 import { valueOf } from "../net/messages.js";
 import { unitIn } from "../ui/units.js";
+import { newStroke } from "../tools/tool.js";
 import { ValueField } from "./value-field.js";
 
 /** @typedef {import("./parameters.js").Row} Row */
@@ -16,6 +17,8 @@ const NO_BENDS = { shapes: [], hasExplicitBends: false };
 const AXES = ["x", "y", "z"];
 /** Wind drag set along with a wind velocity if there is none, as wind has no effect without drag: the default of scenes, in kg/m³. */
 const WIND_DRAG = 0.6;
+/** Changes that follow each other within this time are undone together, in ms: the motion of a slider, or a reset of several rows. */
+const STROKE_MS = 1000;
 
 export class Panel {
   /** @param {HTMLFormElement} form @param {HTMLElement} note @param {import("../tools/tool.js").App} app @param {import("../ui/banner.js").Banner} banner */
@@ -28,6 +31,9 @@ export class Panel {
     this.resetButton = find("parameters-reset", HTMLButtonElement);
     /** Sends the newest unsent value of each parameter and kind. @type {Map<string, () => void>} */
     this.unsent = new Map();
+    /** The number of the last stroke of changes, and the time of its last one. */
+    this.stroke = 0;
+    this.changedMs = -Infinity;
     /** @type {(() => void)[]} */
     this.refreshers = [];
     this.built = "";
@@ -101,7 +107,10 @@ export class Panel {
   /** @param {string} name @param {ParameterValue} value @param {string} [part] a kind of constraint, or a block */
   set(name, value, part = "all") {
     const field = KINDS.includes(part) ? { constraint_kind: part } : part === "all" ? {} : { block: Number(part) };
-    this.unsent.set(`${name} ${part}`, () => this.commands.run("set", { parameter: name, value, ...field }, (outcome) => {
+    const now = performance.now();
+    if (now - this.changedMs > STROKE_MS) this.stroke = newStroke();
+    this.changedMs = now;
+    this.unsent.set(`${name} ${part}`, () => this.commands.run("set", { parameter: name, value, ...field, stroke: this.stroke }, (outcome) => {
       if (outcome.status !== "applied") this.update();
     }));
   }

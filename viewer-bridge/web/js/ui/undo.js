@@ -10,7 +10,7 @@ import { sentence } from "./banner.js";
 /** Titles of the button, by the change that it undoes. @type {Record<Undoable, string>} */
 const NAMES = {
   drag: "the drag", carry: "the move of a solid or an anchor", brush: "the push", pin: "the pin", unpin: "the removal of a pin",
-  cut: "the cut", reset: "the reset", load: "the load of another scene", rewind: "the jump to an earlier state",
+  cut: "the cut", reset: "the reset", set: "the change of parameters", load: "the load of another scene", rewind: "the jump to an earlier state",
 };
 
 /** Tooltip of the button. @param {Undoable} what */

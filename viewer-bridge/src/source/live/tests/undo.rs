@@ -2,8 +2,8 @@
 
 use serde_json::Value;
 use sim_contract::{
-    Action, KeyframeHeader, Load as OwnerLoad, Outcome, ParticleState, Reason, ReceivedState,
-    RestoreContents, SnapshotHeader, Text,
+    Action, KeyframeHeader, Load as OwnerLoad, Outcome, Parameter, ParameterValue, ParticleState,
+    Reason, ReceivedState, RestoreContents, SnapshotHeader, Text,
 };
 use sim_solver::{Scene, Solver, builtin};
 
@@ -180,6 +180,28 @@ fn drags_and_pins_are_undone_one_after_another() {
         fixture.answer_undo(rewind(to_step), 400, Ok(()));
         assert_eq!(fixture.undoable(), left);
     }
+}
+
+#[test]
+fn the_motion_of_a_slider_is_undone_as_a_whole_but_never_the_pace() {
+    let mut fixture = Fixture::start();
+    let set = |parameter: Parameter, value, stroke| Command::Set {
+        parameter: parameter.name().to_owned(),
+        value: ParameterValue::Number(value),
+        constraint_kind: None,
+        block: None,
+        stroke: Some(stroke),
+    };
+    fixture.change(Command::Reset {}, 100);
+    for (step, damping) in [(200, 0.2), (204, 0.3), (209, 0.4)] {
+        fixture.change(set(Parameter::Damping, damping, 2), step);
+    }
+    fixture.change(set(Parameter::TimeScale, 0.5, 3), 300);
+    assert_eq!(fixture.undoable(), "set");
+    fixture.undo(false);
+    fixture.answer_undo(rewind(199), 400, Ok(()));
+    assert_eq!(fixture.answer_of_undo()["text"], "Undid the change of parameters.");
+    assert_eq!(fixture.undoable(), "reset");
 }
 
 #[test]

@@ -2,6 +2,8 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
+use sim_contract::Parameter;
+
 use super::kept_state::KeptState;
 use crate::limits::{UNDO_MAX, UNDO_SIZE_BYTES_MAX};
 use crate::message::{Command, Undoable};
@@ -22,7 +24,7 @@ pub(in crate::source::live) struct LoadKey {
 pub(in crate::source::live) struct Awaited {
     pub(super) client: ClientId,
     pub(super) what: Undoable,
-    /// Cuts, or pushes, with the same number are one stroke.
+    /// Cuts, pushes or changes of parameters with the same number are one stroke.
     pub(super) stroke: Option<u32>,
     pub(super) load: LoadKey,
     /// The state when the command was sent.
@@ -90,6 +92,10 @@ pub(super) fn undoable(command: &Command) -> Option<(Undoable, Option<u32>)> {
         Command::Unpin { .. } => Some((Undoable::Unpin, None)),
         Command::CutSegment { .. } | Command::CutRadius { .. } => Some((Undoable::Cut, None)),
         Command::Reset {} => Some((Undoable::Reset, None)),
+        // The pace is no part of the state that an undo brings back.
+        Command::Set { parameter, stroke, .. } if parameter != Parameter::TimeScale.name() => {
+            Some((Undoable::Set, *stroke))
+        }
         Command::Load { .. } => Some((Undoable::Load, None)),
         Command::Rewind { .. } => Some((Undoable::Rewind, None)),
         _ => None,
@@ -97,7 +103,7 @@ pub(super) fn undoable(command: &Command) -> Option<(Undoable, Option<u32>)> {
 }
 
 impl Stack {
-    /// Returns `true` if a cut or a push belongs to the stroke of the page's last change.
+    /// Returns `true` if a command belongs to the stroke of the page's last change.
     pub(super) fn continues(&self, client: ClientId, what: Undoable, stroke: Option<u32>) -> bool {
         let awaited = self.awaited.values().rev().find(|one| one.client == client);
         let last = awaited.or_else(|| self.last(client).map(|entry| &entry.made));
