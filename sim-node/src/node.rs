@@ -346,6 +346,9 @@ impl Node {
             ));
         }
         self.step += 1;
+        if self.progress.is_state_due {
+            self.lockstep.begin_state(self.step);
+        }
         self.progress.count_step();
         if !self.progress.is_stepping() {
             // A fresh status follows, so that `ctl status` shows the steps.
@@ -444,6 +447,7 @@ impl Node {
     fn position(&self) -> Position {
         let is_last = self.is_done() || !self.progress.is_stepping();
         let Progress { is_paused, time_scale, .. } = self.progress;
-        Position { step: self.step, is_paused, time_scale, is_last }
+        let is_in_place = self.lockstep.has_begun_at(self.step);
+        Position { step: self.step, is_paused, is_in_place, time_scale, is_last }
     }
 }

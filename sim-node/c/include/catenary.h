@@ -17,7 +17,7 @@
 
 #include <stddef.h>
 #include <stdint.h>
-#define CATENARY_CONTRACT_VERSION 5  // version of the layouts of this header
+#define CATENARY_CONTRACT_VERSION 6  // version of the layouts of this header
 #define CATENARY_MEMBERS_MAX 16  // most members of the lockstep
 #define CATENARY_MEMBER_CHANGES_KEPT 32  // changes that a status names
 #define CATENARY_TEXT_SIZE_BYTES_MAX 160  // longest text of a command
@@ -688,7 +688,7 @@ typedef struct {
   uint64_t client_id;
   // Last step that the member was ready for; the step of its joining if there is none.
   uint64_t step;
-  // The member takes part at the steps that are multiples of this number.
+  // Fewest steps from one turn of the member to the next.
   uint32_t every;
   // 1 if the node waits for this member, otherwise 0.
   uint32_t is_awaited;
@@ -700,7 +700,7 @@ typedef struct {
   uint64_t client_id;
   // Last step that was computed before the change.
   uint64_t step;
-  // The member takes part at the steps that are multiples of this number.
+  // Fewest steps from one turn of the member to the next.
   uint32_t every;
   // A `catenary_member_change_kind` as a number.
   uint32_t kind;
@@ -1051,8 +1051,9 @@ catenary_result catenary_read_status(catenary_client *client,
                                      catenary_node_status *status);
 
 // Joins the lockstep: from now on, the node computes the step after a snapshot only when this client has
-// called `catenary_ready` for it, at the steps that are multiples of `every`; 1 is each step. The
-// commands that the client sends before that take effect in that step, so the run is the same each time.
+// called `catenary_ready` for it, in every `every`-th step; 1 is each step. The count begins at the step of joining, and
+// again at each step that shows a load, a reset, a rewind or a restored state, which is a turn itself. The commands that
+// the client sends before `catenary_ready` take effect in the next step, so the run is the same each time.
 //
 // The node goes on without a client that it has waited for too long: 2 s, unless it was started with
 // another --lockstep-timeout. `catenary_missed_turns` shows it.

@@ -9,8 +9,9 @@ use crate::pointers::{check_place, timeout, write};
 use crate::snapshots::{Snapshot, keep};
 
 /// Joins the lockstep: from now on, the node computes the step after a snapshot only when this client has
-/// called `catenary_ready` for it, at the steps that are multiples of `every`; 1 is each step. The
-/// commands that the client sends before that take effect in that step, so the run is the same each time.
+/// called `catenary_ready` for it, in every `every`-th step; 1 is each step. The count begins at the step of joining, and
+/// again at each step that shows a load, a reset, a rewind or a restored state, which is a turn itself. The commands that
+/// the client sends before `catenary_ready` take effect in the next step, so the run is the same each time.
 ///
 /// The node goes on without a client that it has waited for too long: 2 s, unless it was started with
 /// another --lockstep-timeout. `catenary_missed_turns` shows it.

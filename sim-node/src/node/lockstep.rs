@@ -29,6 +29,8 @@ pub(super) struct Lockstep {
     members: Vec<Member>,
     /// Longest wait for a member.
     timeout: Duration,
+    /// The newest step whose state a command has put in place, where every member has a turn.
+    begun: u64,
     /// Since when the node waits for the members; `None` if it does not.
     waiting_since_ns: Option<u64>,
     next_search_ns: u64,
@@ -50,8 +52,9 @@ struct Member {
 }
 
 impl Member {
-    fn is_awaited(&self, step: u64) -> bool {
-        step.is_multiple_of(self.every) && self.ready.is_none_or(|ready| ready < step)
+    /// `begun` is the newest step whose state a command has put in place.
+    fn is_awaited(&self, step: u64, begun: u64) -> bool {
+        self.ready.is_none_or(|ready| ready < begun || step >= ready + self.every)
     }
 }
 
@@ -67,6 +70,7 @@ impl Lockstep {
         Self {
             members: Vec::new(),
             timeout,
+            begun: 0,
             waiting_since_ns: None,
             next_search_ns: 0,
             changes: MemberChanges::default(),
@@ -83,6 +87,7 @@ impl Lockstep {
         for member in &mut self.members {
             (member.joined, member.ready) = (0, None);
         }
+        self.begun = 0;
         self.waiting_since_ns = None;
         self.changes = MemberChanges::default();
     }
@@ -159,7 +164,17 @@ impl Lockstep {
     }
 
     fn is_waiting(&self, step: u64) -> bool {
-        self.members.iter().any(|member| member.is_awaited(step))
+        self.members.iter().any(|member| member.is_awaited(step, self.begun))
+    }
+
+    /// Begins a new count of steps for every member at a step that shows a state put in place.
+    pub(super) fn begin_state(&mut self, step: u64) {
+        self.begun = step;
+    }
+
+    /// Returns `true` for the newest step whose state a command has put in place.
+    pub(super) fn has_begun_at(&self, step: u64) -> bool {
+        self.begun == step && step > 0
     }
 
     /// Removes the members that are gone, and those that the node has waited for too long.
@@ -179,10 +194,10 @@ impl Lockstep {
             publisher.listed_members()
         };
         let waited = Duration::from_nanos(now_ns.saturating_sub(since_ns));
-        let timeout = self.timeout;
+        let (timeout, begun) = (self.timeout, self.begun);
         self.remove_gone(publisher, &connections, report);
         self.members.retain(|member| {
-            let has_timed_out = waited > timeout && member.is_awaited(step);
+            let has_timed_out = waited > timeout && member.is_awaited(step, begun);
             if has_timed_out {
                 let Member { client_id, every, .. } = *member;
                 report(Event::TimedOut { client_id, every, timeout });
@@ -233,7 +248,7 @@ impl Lockstep {
             client_id: member.client_id,
             step: member.ready.unwrap_or(member.joined),
             every: u32::try_from(member.every).unwrap_or(u32::MAX),
-            is_awaited: u32::from(member.is_awaited(step)),
+            is_awaited: u32::from(member.is_awaited(step, self.begun)),
         })
     }
 }
@@ -264,14 +279,20 @@ mod tests {
             let last = Published { run_id: RUN, step };
             lockstep.add(message, ConnectionId(1), last, &mut |event| events.push(event));
         };
-        add(&mut lockstep, join, 0);
-        assert!(lockstep.is_waiting(0) && !lockstep.is_waiting(1) && lockstep.is_waiting(4));
-        add(&mut lockstep, ready(7, 4, 4), 6);
-        assert!(!lockstep.is_waiting(4) && !lockstep.is_waiting(6) && lockstep.is_waiting(8));
+        add(&mut lockstep, join, 2);
+        assert!(lockstep.is_waiting(2), "the count begins at the step of joining");
+        add(&mut lockstep, ready(7, 2, 4), 2);
+        assert!(!lockstep.is_waiting(2) && !lockstep.is_waiting(5) && lockstep.is_waiting(6));
         // An older message changes nothing, and one of another run neither.
         add(&mut lockstep, ready(7, 0, 4), 6);
         add(&mut lockstep, Ready { run_id: 8, ..ready(7, 8, 4) }, 8);
-        assert!(!lockstep.is_waiting(4) && lockstep.is_waiting(8));
+        assert!(!lockstep.is_waiting(5) && lockstep.is_waiting(6));
+        // A state in place is a turn, and the count begins again.
+        add(&mut lockstep, ready(7, 6, 4), 6);
+        lockstep.begin_state(7);
+        assert!(lockstep.is_waiting(7) && lockstep.has_begun_at(7) && !lockstep.has_begun_at(8));
+        add(&mut lockstep, ready(7, 7, 4), 7);
+        assert!(!lockstep.is_waiting(7) && !lockstep.is_waiting(10) && lockstep.is_waiting(11));
         assert_eq!(events, [Event::Joined { client_id: 7, every: 4 }]);
         assert_eq!(lockstep.refused_count, 0);
     }

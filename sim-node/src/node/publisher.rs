@@ -36,6 +36,8 @@ pub(crate) struct StepTimes {
 pub(crate) struct Position {
     pub(crate) step: u64,
     pub(crate) is_paused: bool,
+    /// A command has put the state of the step in place.
+    pub(crate) is_in_place: bool,
     /// Simulated time per wall-clock time.
     pub(crate) time_scale: f64,
     /// No further step follows for now, so late subscribers need this one.
@@ -446,7 +448,7 @@ impl Publisher {
             topology_revision: self.topology_revision,
             torn_count: count(solver.torn().len()),
             particle_count: count(solver.particle_count()),
-            flags: if position.is_paused { SnapshotFlags::PAUSED } else { 0 },
+            flags: flags(position),
             stride: u32::try_from(self.every).unwrap_or(u32::MAX),
             snapshot_index: self.snapshot_count,
         }
@@ -466,6 +468,11 @@ impl Publisher {
     pub(crate) fn missing_file(&self) -> Option<PathBuf> {
         self.owner.missing_file()
     }
+}
+
+fn flags(position: Position) -> u32 {
+    let paused = if position.is_paused { SnapshotFlags::PAUSED } else { 0 };
+    paused | if position.is_in_place { SnapshotFlags::IN_PLACE } else { 0 }
 }
 
 /// Parameters of a solver with the time scale of the node.

@@ -40,7 +40,7 @@ pub(super) struct Published {
 
 impl Member {
     fn is_awaited(&self, step: u64) -> bool {
-        step.is_multiple_of(self.every.into()) && self.ready.is_none_or(|ready| ready < step)
+        self.ready.is_none_or(|ready| step >= ready + u64::from(self.every))
     }
 }
 
@@ -137,14 +137,14 @@ mod tests {
     fn a_member_is_awaited_at_its_steps_until_it_is_ready_and_again_in_the_next_run() {
         let mut lockstep = Lockstep::default();
         lockstep.add(ready(0, 0), ConnectionId(1), LAST);
-        assert_eq!((awaited(&lockstep, 8), awaited(&lockstep, 9)), (vec![1], vec![0]));
+        assert_eq!((awaited(&lockstep, 8), awaited(&lockstep, 9)), (vec![1], vec![1]));
         // Steps of another run, or of the future, are none of this one.
         lockstep.add(ready(3, 8), ConnectionId(1), LAST);
         lockstep.add(ready(9, 12), ConnectionId(1), LAST);
         lockstep.add(Ready { tag: 0, ..ready(9, 8) }, ConnectionId(1), LAST);
         assert_eq!(awaited(&lockstep, 8), [1]);
         lockstep.add(ready(9, 8), ConnectionId(1), LAST);
-        assert_eq!((awaited(&lockstep, 8), awaited(&lockstep, 12)), (vec![0], vec![1]));
+        assert_eq!((awaited(&lockstep, 11), awaited(&lockstep, 12)), (vec![0], vec![1]));
         lockstep.begin_run();
         assert_eq!(awaited(&lockstep, 0), [1]);
     }

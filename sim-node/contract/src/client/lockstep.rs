@@ -48,12 +48,21 @@ impl LockstepError {
     }
 }
 
+/// The step at which a node has admitted a member.
+#[derive(Debug, Clone, Copy, Default)]
+struct Joined {
+    run_id: u64,
+    step: u64,
+}
+
 /// A member's side of the lockstep.
 #[derive(Debug)]
 pub(crate) struct Member {
     writer: ValueWriter<Ready>,
     /// The message of the last turn.
     message: Ready,
+    /// Place of the admission. Earlier snapshots are none of its turns.
+    joined: Joined,
     /// The turn has begun, and the message is not sent.
     is_in_turn: bool,
     /// Number of turns that the node has computed without this member.
@@ -69,7 +78,13 @@ impl Member {
         let services = &attachment.services;
         let message = Ready { client_id, every: every.get(), tag: Ready::TAG, ..Ready::default() };
         let writer = ValueWriter::create(&services.config, &services.ready, &READY)?;
-        Ok(Self { writer, message, is_in_turn: false, missed_turn_count: 0 })
+        let joined = Joined::default();
+        Ok(Self { writer, message, joined, is_in_turn: false, missed_turn_count: 0 })
+    }
+
+    /// Notes the step at which the node has admitted this member.
+    pub(crate) fn admit(&mut self, run_id: u64, step: u64) {
+        self.joined = Joined { run_id, step };
     }
 
     pub(crate) fn join(&self) -> Result<(), LockstepError> {
@@ -85,8 +100,11 @@ impl Member {
     /// Returns `true` for a snapshot whose turn is this member's, and not yet ended.
     pub(crate) fn takes_part(&self, header: &SnapshotHeader) -> bool {
         let Ready { run_id, step, every, .. } = self.message;
-        let is_new = header.run_id != run_id || header.step > step;
-        is_new && header.step.is_multiple_of(every.into())
+        if header.run_id != run_id {
+            return header.run_id != self.joined.run_id || header.step >= self.joined.step;
+        }
+        let is_in_place = header.step > step && header.flags & SnapshotFlags::IN_PLACE != 0;
+        is_in_place || header.step >= step + u64::from(every)
     }
 
     pub(crate) fn begin_turn(&mut self, header: &SnapshotHeader) {
@@ -102,9 +120,9 @@ impl Member {
         if header.run_id != run_id || header.flags & SnapshotFlags::REPLAY != 0 {
             return 0;
         }
-        let period = least_common_multiple(every.into(), header.stride.max(1).into());
-        let next = (step / period + 1) * period;
-        header.step.saturating_sub(next).div_ceil(period)
+        let (every, stride) = (u64::from(every), u64::from(header.stride.max(1)));
+        let next = (step + every).next_multiple_of(stride);
+        header.step.saturating_sub(next).div_ceil(every.next_multiple_of(stride))
     }
 
     pub(crate) fn missed_turn_count(&self) -> u64 {
@@ -119,12 +137,4 @@ impl Member {
         }
         Ok(())
     }
-}
-
-fn least_common_multiple(a: u64, b: u64) -> u64 {
-    let (mut divisor, mut rest) = (a, b);
-    while rest > 0 {
-        (divisor, rest) = (rest, divisor % rest);
-    }
-    a / divisor * b
 }

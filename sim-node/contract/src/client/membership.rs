@@ -23,8 +23,10 @@ impl Client {
         self.join_lockstep_every(NonZeroU32::MIN, timeout)
     }
 
-    /// Joins the lockstep, drops unread snapshots, and takes part only at the steps that are multiples
-    /// of `every`, as a controller of 60 Hz does beside a node of 240 Hz with `every` = 4.
+    /// Joins the lockstep, drops unread snapshots, and takes part only in every `every`-th step, as a controller of
+    /// 60 Hz does beside a node of 240 Hz with `every` = 4. The count begins at the step of joining, and again at each
+    /// step that shows a load, a reset, a rewind or a restored state, which is a turn itself. A node with `--every` has
+    /// the turn at the next step that it publishes.
     ///
     /// # Errors
     /// Same as [`Client::join_lockstep`].
@@ -63,18 +65,23 @@ impl Client {
     pub fn await_membership(&mut self, timeout: Duration) -> Result<(), LockstepError> {
         let deadline = Deadline::after(timeout);
         while let Some(status) = self.status(deadline.remaining())? {
-            if status.members().iter().any(|member| member.client_id == self.id) {
+            let member = self.member.as_mut().ok_or(LockstepError::NotJoined)?;
+            let admission = status.members().iter().find(|one| one.client_id == self.id);
+            if let Some(admission) = admission {
+                member.admit(status.run_id, admission.step);
                 return Ok(());
             }
             // A node that waits only briefly may have dropped this client before it knew of its
             // membership.
-            self.member.as_ref().ok_or(LockstepError::NotJoined)?.join()?;
+            member.join()?;
         }
         Err(LockstepError::not_admitted(&self.attachment, timeout))
     }
+
     /// Returns the number of turns that the node has computed without this client since it joined, up to the last
-    /// turn of [`Client::next_turn`]. Those at the start of a new run are not counted. The node goes on without a member that it has waited for longer than its `--lockstep-timeout`, and the member joins
-    /// again with its next turn. Turns of a replay are not counted, because a recording may lack snapshots.
+    /// turn of [`Client::next_turn`]. Those at the start of a new run are not counted. The node goes on without a
+    /// member that it has waited for longer than its `--lockstep-timeout`, and the member joins again with its next
+    /// turn. Turns of a replay are not counted, because a recording may lack snapshots.
     pub fn missed_turns(&self) -> u64 {
         self.member.as_ref().map_or(0, Member::missed_turn_count)
     }

@@ -34,6 +34,7 @@ impl Client {
         state: &GivenState<'_>,
         timeout: Duration,
     ) -> Result<Outcome, RequestError> {
+        self.check_turn()?;
         let sent = self.send_state(state)?;
         let outcome = self.wait_for_outcome(sent.sequence, sent.missed_before, timeout);
         self.take_back(sent);
@@ -44,9 +45,8 @@ impl Client {
     /// has arrived, or is no longer awaited, [`Client::take_back`] ends it.
     ///
     /// # Errors
-    /// Same as [`Client::send`], and in this client's turn of the lockstep.
+    /// Same as [`Client::send`].
     pub fn send_state(&mut self, state: &GivenState<'_>) -> Result<SentState, RequestError> {
-        self.check_turn()?;
         let commander = open_commander(&mut self.commander, &self.attachment, self.id)?;
         let missed_before = commander.missed_count();
         let (sequence, writer) = commander.send_state(&self.attachment, state)?;

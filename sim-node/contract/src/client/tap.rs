@@ -119,8 +119,8 @@ impl Tap {
         Ok(Self::subscribe(attachment, None)?)
     }
 
-    /// Attaches as a member of the lockstep: the owner waits, at the steps that are multiples of
-    /// [`Tap::LOCKSTEP_EVERY`], until [`Tap::ready`] is called. So the tap misses nothing at any rate, as long
+    /// Attaches as a member of the lockstep: the owner waits in every step, [`Tap::LOCKSTEP_EVERY`], until
+    /// [`Tap::ready`] is called. So the tap misses nothing at any rate, as long
     /// as it is ready in time: a node goes on without a member after its `--lockstep-timeout`, 2 s by default,
     /// and a replay after 10 s. A node with `--every` waits only at published steps. The tap joins before it
     /// subscribes, and again with each turn, also at the next owner of the name.

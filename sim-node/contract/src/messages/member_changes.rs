@@ -31,7 +31,7 @@ pub struct MemberChange {
     pub client_id: u64,
     /// Last step that was computed before the change.
     pub step: u64,
-    /// The member takes part at the steps that are multiples of this number.
+    /// Fewest steps from one turn of the member to the next.
     pub every: u32,
     /// A [`MemberChangeKind`] as a number.
     pub kind: u32,

@@ -16,7 +16,7 @@ pub struct Ready {
     pub run_id: u64,
     /// The node may compute the step after this one: the member has sent its commands for it.
     pub step: u64,
-    /// The member takes part at the steps that are multiples of this number, at least 1.
+    /// Fewest steps from one turn of the member to the next, at least 1.
     pub every: u32,
     /// [`Ready::TAG`] or [`Ready::REPEAT_TAG`]. Anything else is refused.
     pub tag: u32,

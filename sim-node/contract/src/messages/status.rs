@@ -80,7 +80,7 @@ pub struct MemberStatus {
     pub client_id: u64,
     /// Last step that the member was ready for; the step of its joining if there is none.
     pub step: u64,
-    /// The member takes part at the steps that are multiples of this number.
+    /// Fewest steps from one turn of the member to the next.
     pub every: u32,
     /// 1 if the node waits for this member, otherwise 0.
     pub is_awaited: u32,

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use sim_contract::{MemberChange, MemberChangeKind};
 
-/// A change of the members. The member takes part at the multiples of `every`.
+/// A change of the members. The member takes part in every `every`-th step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::node) enum Event {
     Joined {
