@@ -217,6 +217,7 @@ fn bad_action(held: &HeldState, rng: &mut Rng) -> Action {
             value: ParameterValue::Number(0.1),
             constraint_kind: None,
             block: Some(rng.u32(1000..)),
+            collider: None,
         },
         5 => Action::Rewind { to_step: Some(u64::MAX >> 12), back_steps: None },
         // A command alone has no state.
@@ -231,6 +232,7 @@ fn set(parameter: &str, value: f32) -> Action {
         value: ParameterValue::Number(value),
         constraint_kind: None,
         block: None,
+        collider: None,
     }
 }
 

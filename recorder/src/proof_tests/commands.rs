@@ -114,6 +114,9 @@ pub(super) const COMMANDS: &str = r#"
     {"step":54,"kind":"set","parameter":"bending","value":0.03,"block":0}
     {"step":55,"kind":"set","parameter":"contact","value":0.05}
     {"step":56,"kind":"set","parameter":"contact_friction","value":0.5}
+    {"step":56,"kind":"set","parameter":"friction","value":0.125}
+    {"step":57,"kind":"set","parameter":"friction","value":0.75,"collider":1}
+    {"step":57,"kind":"set","parameter":"restitution","value":0.5,"collider":0}
     {"step":58,"kind":"set","parameter":"contact","value":null}
     {"step":60,"kind":"release","particle":60}
     {"step":61,"kind":"mark","text":"the sleeve slips"}

@@ -44,6 +44,7 @@
 #define CATENARY_OPTION_STATE 256  // a restore has a complete state
 #define CATENARY_OPTION_MOTION 512  // a restore has positions and velocities
 #define CATENARY_OPTION_BLOCK 1024  // a set is for one generated block
+#define CATENARY_OPTION_COLLIDER 2048  // a set is for one collider
 
 
 // Result of a call. `catenary_last_error` describes every other result than `CATENARY_OK`.
@@ -210,6 +211,8 @@ enum catenary_parameter
   CATENARY_PARAMETER_CONTACT = 15,
   CATENARY_PARAMETER_CONTACT_FRICTION = 16,
   CATENARY_PARAMETER_BENDING = 17,
+  CATENARY_PARAMETER_FRICTION = 18,
+  CATENARY_PARAMETER_RESTITUTION = 19,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -329,7 +332,7 @@ typedef struct catenary_client catenary_client;
 // | 13 cut_segment | | from, to, direction | |
 // | 14 move_anchor | anchor | translation | `rotation` |
 // | 15 move_collider | collider | translation | `rotation` |
-// | 16 set | block | value, if a vector | `text` parameter, `number` value, `count` constraint kind |
+// | 16 set | block or collider | value, if a vector | `text` parameter, `number` value, `count` constraint kind |
 // | 17 load | | | `text` scene |
 // | 18 rewind | step, low 32 bits | | `count` step, high 32 bits; or `CATENARY_OPTION_BACK` and `count` steps |
 // | 19 restore | hash, low 32 bits | | `count` hash, high 32 bits; `CATENARY_OPTION_STATE` or `CATENARY_OPTION_MOTION` |
@@ -339,7 +342,7 @@ typedef struct {
   // Number of the action in the table above.
   uint32_t kind;
   // Index of the particle, constraint, anchor, collider or, if `CATENARY_OPTION_BLOCK` is set, generated
-  // block.
+  // block. A set has a collider only with `CATENARY_OPTION_COLLIDER`.
   uint32_t index;
   // Random number of the sender, below 2^53 (exact in JSON); `CONSOLE_CLIENT_ID` is the console.
   uint64_t client_id;
@@ -979,6 +982,11 @@ catenary_command catenary_command_for_kind(catenary_command set, uint32_t constr
 // returned unchanged.
 catenary_command catenary_command_for_block(catenary_command set,
                                             uint32_t block);
+
+// Returns a command that sets "friction" or "restitution", for one collider only: its index in the scene. A node
+// rejects a collider for another parameter. Any command other than a set is returned unchanged.
+catenary_command catenary_command_for_collider(catenary_command set,
+                                               uint32_t collider);
 
 // Loads a built-in scene, or a file that the node can read; at most 160 bytes.
 catenary_command catenary_command_load(const char *scene);

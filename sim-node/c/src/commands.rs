@@ -237,7 +237,13 @@ pub extern "C" fn catenary_command_for_kind(set: Command, constraint_kind: u32) 
     match set.action() {
         Action::Set { parameter, value, .. } => {
             let constraint_kind = Some(KindFilter::from_number(constraint_kind));
-            command(Some(Action::Set { parameter, value, constraint_kind, block: None }))
+            command(Some(Action::Set {
+                parameter,
+                value,
+                constraint_kind,
+                block: None,
+                collider: None,
+            }))
         }
         _ => set,
     }
@@ -254,6 +260,23 @@ pub extern "C" fn catenary_command_for_block(set: Command, block: u32) -> Comman
             value,
             constraint_kind: None,
             block: Some(block),
+            collider: None,
+        })),
+        _ => set,
+    }
+}
+
+/// Returns a command that sets "friction" or "restitution", for one collider only: its index in the scene. A node
+/// rejects a collider for another parameter. Any command other than a set is returned unchanged.
+#[unsafe(no_mangle)]
+pub extern "C" fn catenary_command_for_collider(set: Command, collider: u32) -> Command {
+    match set.action() {
+        Action::Set { parameter, value, .. } => command(Some(Action::Set {
+            parameter,
+            value,
+            constraint_kind: None,
+            block: None,
+            collider: Some(collider),
         })),
         _ => set,
     }
@@ -261,8 +284,14 @@ pub extern "C" fn catenary_command_for_block(set: Command, block: u32) -> Comman
 
 fn set(parameter: *const c_char, value: Option<ParameterValue>) -> Command {
     let pair = short_text(parameter).zip(value);
-    let (constraint_kind, block) = (None, None);
-    command(pair.map(|(parameter, value)| Action::Set { parameter, value, constraint_kind, block }))
+    let (constraint_kind, block, collider) = (None, None, None);
+    command(pair.map(|(parameter, value)| Action::Set {
+        parameter,
+        value,
+        constraint_kind,
+        block,
+        collider,
+    }))
 }
 
 /// Loads a built-in scene, or a file that the node can read; at most 160 bytes.

@@ -18,7 +18,13 @@ fn short(text: &str) -> Text {
 }
 
 fn set(parameter: &str, value: ParameterValue) -> Action {
-    Action::Set { parameter: short(parameter), value, constraint_kind: None, block: None }
+    Action::Set {
+        parameter: short(parameter),
+        value,
+        constraint_kind: None,
+        block: None,
+        collider: None,
+    }
 }
 
 const ZERO: [f32; 3] = [0.0; 3];
@@ -35,13 +41,23 @@ fn each_function_makes_the_command_of_its_name() {
         value: ParameterValue::Number(0.5),
         constraint_kind: Some(KindFilter::from_number(2)),
         block: None,
+        collider: None,
     };
     let bending = catenary_command_set(c"bending".as_ptr(), 0.5);
+    let friction = catenary_command_set(c"friction".as_ptr(), 0.5);
+    let for_collider = Action::Set {
+        parameter: short("friction"),
+        value: ParameterValue::Number(0.5),
+        constraint_kind: None,
+        block: None,
+        collider: Some(2),
+    };
     let for_block = Action::Set {
         parameter: short("bending"),
         value: ParameterValue::Number(0.5),
         constraint_kind: None,
         block: Some(3),
+        collider: None,
     };
     let cases = [
         (catenary_command_pin(7), Action::Pin { particle: 7 }),
@@ -76,6 +92,8 @@ fn each_function_makes_the_command_of_its_name() {
         (catenary_command_for_kind(catenary_command_pin(7), 2), Action::Pin { particle: 7 }),
         (catenary_command_for_block(bending, 3), for_block),
         (catenary_command_for_block(catenary_command_pin(7), 3), Action::Pin { particle: 7 }),
+        (catenary_command_for_collider(friction, 2), for_collider),
+        (catenary_command_for_collider(catenary_command_pin(7), 2), Action::Pin { particle: 7 }),
         (catenary_command_load(c"flag".as_ptr()), Action::Load { scene: short("flag") }),
         (
             catenary_command_rewind_to(1 << 40),

@@ -155,6 +155,35 @@ def test_motion_is_replaced_at_once_as_in_a_node(start_node: StartNode) -> None:
         simulation.restore(still.positions)  # type: ignore[arg-type]
 
 
+def test_the_friction_of_a_collider_changes_how_far_a_particle_slides(tmp_path: Path) -> None:
+    scene = tmp_path / "slide.toml"
+    scene.write_text("""
+        version = 1
+        [[particle]]
+        position = [0, 0, 0]
+        velocity = [1, 0, 0]
+        [[collider]]
+        shape = "plane"
+        normal = [0, 1, 0]
+        offset = 0
+        friction = 0.5
+        """)
+
+    def slid(**values: object) -> float:
+        simulation = catenary.Simulation(scene)
+        simulation.set(**values)
+        simulation.step(240)
+        return float(simulation.positions[0, 0])
+
+    # v^2 / (2 mu g), within 2 %; without friction, it slides on.
+    assert slid(friction={0: 0.5}) == pytest.approx(1 / (2 * 0.5 * 9.81), rel=0.02)
+    assert slid(friction={0: 0.0}) == pytest.approx(1.0, rel=0.02)
+    with pytest.raises(catenary.Rejected, match="collider"):
+        slid(friction={99: 0.5})
+    with pytest.raises(TypeError, match="collider"):
+        slid(friction={})
+
+
 def test_a_reset_brings_the_initial_state_and_parameters_back() -> None:
     simulation = catenary.Simulation("curtain")
     initial = simulation.hash

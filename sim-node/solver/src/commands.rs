@@ -242,12 +242,26 @@ impl Solver {
         self.set_for(name, value, Target::Block(block))
     }
 
+    /// Sets the `friction` or the `restitution` of one collider, from the next step on.
+    ///
+    /// # Errors
+    /// The parameter is another one, the value is out of range, or there is no such collider.
+    pub fn set_collider(
+        &mut self,
+        name: &str,
+        value: ParameterValue,
+        collider: u32,
+    ) -> Result<(), Reason> {
+        self.set_for(name, value, Target::Collider(collider))
+    }
+
     fn set_for(&mut self, name: &str, value: ParameterValue, target: Target) -> Result<(), Reason> {
         // Taken out meanwhile, because the context borrows the rest.
         let mut parameters = std::mem::take(&mut self.parameters);
         let affected = parameters.set(name, value, target, self.context());
         self.parameters = parameters;
         let affected = affected?;
+        self.follow_surfaces();
         self.due.constraints |= affected > Affected::Nothing;
         self.due.tethers |= affected == Affected::RigidPaths;
         Ok(())

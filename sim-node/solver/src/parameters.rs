@@ -1,6 +1,7 @@
 //! The parameters that can change while a scene runs.
 
 pub(crate) mod block_bending;
+pub(crate) mod surfaces;
 
 use serde::{Deserialize, Serialize};
 use sim_types::{
@@ -14,6 +15,7 @@ use crate::scene::definition::Scene;
 use crate::scene::definition::limits::Limits;
 use crate::scene::definition::wind::Wind;
 use block_bending::BlockBending;
+use surfaces::Surfaces;
 
 /// Values that can change while a scene runs. Part of the state, and of a keyframe.
 #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -41,22 +43,28 @@ pub(crate) struct Parameters {
     /// its other fields, because older keyframes end there.
     #[serde(skip)]
     pub(crate) block_bending: BlockBending,
+    /// The surface of each collider. A keyframe has them behind its other fields, too.
+    #[serde(skip)]
+    pub(crate) surfaces: Surfaces,
 }
 
 impl Clone for Parameters {
     fn clone(&self) -> Self {
-        Self { block_bending: self.block_bending.clone(), ..*self }
+        let Self { block_bending, surfaces, .. } = self;
+        Self { block_bending: block_bending.clone(), surfaces: surfaces.clone(), ..*self }
     }
 
     /// Allocates nothing if both belong to the same scene.
     fn clone_from(&mut self, source: &Self) {
         let mut block_bending = std::mem::take(&mut self.block_bending);
         block_bending.clone_from(&source.block_bending);
-        *self = Self { block_bending, ..*source };
+        let mut surfaces = std::mem::take(&mut self.surfaces);
+        surfaces.clone_from(&source.surfaces);
+        *self = Self { block_bending, surfaces, ..*source };
     }
 }
 
-/// The constraints or bends that a setting is for.
+/// The constraints, bends or colliders that a setting is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Target {
     /// All.
@@ -65,16 +73,23 @@ pub(crate) enum Target {
     Kind(ConstraintKind),
     /// The bends of a generated block.
     Block(u32),
+    /// A collider.
+    Collider(u32),
 }
 
 impl Target {
     /// The target of a command.
-    pub(crate) fn new(kind: Option<KindFilter>, block: Option<u32>) -> Result<Self, Reason> {
-        match (kind, block) {
-            (None, None) => Ok(Self::All),
-            (None, Some(block)) => Ok(Self::Block(block)),
-            (Some(KindFilter::Known(kind)), None) => Ok(Self::Kind(kind)),
-            (Some(_), _) => Err(Reason::OutOfRange),
+    pub(crate) fn new(
+        kind: Option<KindFilter>,
+        block: Option<u32>,
+        collider: Option<u32>,
+    ) -> Result<Self, Reason> {
+        match (kind, block, collider) {
+            (None, None, None) => Ok(Self::All),
+            (None, Some(block), None) => Ok(Self::Block(block)),
+            (None, None, Some(collider)) => Ok(Self::Collider(collider)),
+            (Some(KindFilter::Known(kind)), None, None) => Ok(Self::Kind(kind)),
+            _ => Err(Reason::OutOfRange),
         }
     }
 
@@ -84,12 +99,16 @@ impl Target {
         match self {
             Self::Kind(_) if !info.is_per_kind => Err(Reason::OutOfRange),
             Self::Block(_) if parameter != Parameter::Bending => Err(Reason::OutOfRange),
+            Self::Collider(_) if !info.is_per_collider => Err(Reason::OutOfRange),
+            Self::Collider(collider) if u64::from(collider) >= context.size.colliders => {
+                Err(Reason::UnknownCollider)
+            }
             Self::Block(block) => match context.bent_blocks.get(block as usize) {
                 Some(true) => Ok(()),
                 Some(false) => Err(Reason::NoEffectHere),
                 None => Err(Reason::OutOfRange),
             },
-            Self::All | Self::Kind(_) => Ok(()),
+            Self::All | Self::Kind(_) | Self::Collider(_) => Ok(()),
         }
     }
 }
@@ -131,6 +150,7 @@ impl Parameters {
             softness: [None; 4],
             bending: None,
             block_bending: BlockBending::with_room_for(scene.generators.len()),
+            surfaces: Surfaces::new(&scene.colliders),
         }
     }
 
@@ -168,17 +188,27 @@ impl Parameters {
         if parameter == Parameter::Bending && !context.has_bends {
             return Err(Reason::NoEffectHere);
         }
+        if info.is_per_collider && context.size.colliders == 0 {
+            return Err(Reason::NoEffectHere);
+        }
         target.check(parameter, context)?;
         check_value(info, value, context)?;
         self.check_pass_count(parameter, value, context)?;
+        let had_bounces = self.surfaces.have_bounces();
         self.store(parameter, value, target);
         Ok(match parameter {
+            // The first bounce, and the end of the last one, change the fields of particles.
+            Parameter::Restitution if self.surfaces.have_bounces() != had_bounces => {
+                Affected::Constraints
+            }
             Parameter::Compliance | Parameter::Stiffness => Affected::RigidPaths,
             Parameter::Gravity
             | Parameter::Damping
             | Parameter::WindVelocity
             | Parameter::MaxSpeed
             | Parameter::ContactFriction
+            | Parameter::Friction
+            | Parameter::Restitution
             | Parameter::TimeScale => Affected::Nothing,
             Parameter::MaxStretch
             | Parameter::TearStretch
@@ -221,10 +251,12 @@ impl Parameters {
         self.softness.map(|softness| softness.map(f32::to_bits))
     }
 
-    fn pass_bits(&self) -> [u32; 5] {
+    fn pass_bits(&self) -> [u32; 6] {
         let has_wind = u32::from(self.wind_drag > 0.0);
         let has_contacts = u32::from(self.contact_thickness.is_some());
-        [self.substeps, self.iterations, self.relaxation.to_bits(), has_wind, has_contacts]
+        let has_bounces = u32::from(self.surfaces.have_bounces());
+        let relaxation = self.relaxation.to_bits();
+        [self.substeps, self.iterations, relaxation, has_wind, has_contacts, has_bounces]
     }
 
     fn limit_bits(&self) -> [Option<u32>; 4] {
@@ -276,15 +308,17 @@ impl Parameters {
             Parameter::TearForce => self.tear_force = number,
             Parameter::Compliance | Parameter::Stiffness => match target {
                 Target::Kind(kind) => self.softness[kind as usize] = number,
-                Target::All | Target::Block(_) => self.softness = [number; 4],
+                _ => self.softness = [number; 4],
             },
             Parameter::Bending => match target {
                 Target::Block(block) => self.block_bending.set(block, number),
-                Target::All | Target::Kind(_) => {
+                _ => {
                     self.bending = number;
                     self.block_bending.clear();
                 }
             },
+            Parameter::Friction => self.surfaces.set(target, |one| one.friction = or_zero),
+            Parameter::Restitution => self.surfaces.set(target, |one| one.restitution = or_zero),
             // The pace belongs to the node. It is checked here, so that every program refuses the
             // same values.
             Parameter::TimeScale => {}
@@ -342,7 +376,10 @@ impl Parameters {
             .block_bending
             .iter()
             .all(|(block, _)| Target::Block(block).check(Parameter::Bending, context).is_ok());
-        are_valid && are_blocks_valid && context.size.allows(self.substeps, self.iterations)
+        are_valid
+            && are_blocks_valid
+            && self.surfaces.are_valid(context)
+            && context.size.allows(self.substeps, self.iterations)
     }
 }
 

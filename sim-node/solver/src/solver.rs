@@ -188,6 +188,7 @@ impl Solver {
         for collider in &mut self.colliders {
             collider.reset();
         }
+        self.follow_surfaces();
         self.due = Due::ALL;
         self.scene_step = 0;
         self.is_put_in_place = true;
@@ -230,11 +231,18 @@ impl Solver {
     pub(crate) fn scene_fields(&self, parameters: &Parameters) -> SceneFields {
         SceneFields {
             colliders: !self.colliders.is_empty(),
-            bounces: self.colliders.iter().any(|collider| collider.restitution > 0.0),
+            bounces: parameters.surfaces.have_bounces(),
             wind: !self.model.triangles.is_empty() && parameters.wind_drag > 0.0,
             bend_multipliers: !self.model.bends.is_empty() && parameters.iterations > 1,
             tethers: self.settings.tethers as usize,
             divided_sweep: parameters.contact_thickness.is_some() || self.has_bodies(),
+        }
+    }
+
+    /// Gives each collider the friction and the restitution of the parameters.
+    pub(crate) fn follow_surfaces(&mut self) {
+        for (collider, surface) in self.colliders.iter_mut().zip(self.parameters.surfaces.all()) {
+            collider.surface = *surface;
         }
     }
 

@@ -26,6 +26,7 @@ fn set(parameter: Parameter, value: f32) -> Action {
         value,
         constraint_kind: None,
         block: None,
+        collider: None,
     }
 }
 
@@ -105,6 +106,7 @@ fn prepared_constraints_change_no_bit() {
             value: ParameterValue::Off,
             constraint_kind: Some(KindFilter::Known(sim_solver::ConstraintKind::Shear)),
             block: None,
+            collider: None,
         },
         set(Parameter::TearStretch, 1.1),
         set(Parameter::MaxStretch, 1.2),
@@ -252,6 +254,7 @@ fn nothing_is_planned_for_commands_that_are_cheap_or_wrong() {
         value: ParameterValue::Number(value),
         constraint_kind: None,
         block: None,
+        collider: None,
     };
     assert!(solver.plan([action("compliance", 1e-3)]).is_some());
     for action in [

@@ -267,6 +267,9 @@ fn with_parameter(parameter: Parameter, value: f32) -> Result<Scene, SceneError>
             "[[generate]]\nshape = \"rope\"\ncount = 3\nfrom = [0, 0, 0]\nto = [1, 0, 0]\n\
              {name} = {value:?}"
         ),
+        Parameter::Friction | Parameter::Restitution => format!(
+            "[[collider]]\nshape = \"plane\"\nnormal = [0, 1, 0]\noffset = 0\n{name} = {value:?}"
+        ),
         _ if parameter.info().form == ValueForm::Whole => format!("[solver]\n{name} = {value}"),
         _ => format!("[solver]\n{name} = {value:?}"),
     };

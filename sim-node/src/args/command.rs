@@ -286,7 +286,8 @@ pub(crate) struct PoseArgs {
         sim-node ctl set gravity 0 -1.6 0\n  \
         sim-node ctl set tear_stretch off\n  \
         sim-node ctl set compliance 1e-4 --kind bend\n  \
-        sim-node ctl set bending 1e-3 --block 1"
+        sim-node ctl set bending 1e-3 --block 1\n  \
+        sim-node ctl set friction 0.3 --collider 2"
 )]
 pub(crate) struct SetArgs {
     #[arg(help = parameters_help(), value_parser = parameter_name)]
@@ -300,6 +301,9 @@ pub(crate) struct SetArgs {
     /// Generated block of the scene whose bends receive the bending, counted from 0 [default: all bends]
     #[arg(long, value_name = "N", value_parser = index)]
     pub(crate) block: Option<u32>,
+    /// Collider that receives the friction or restitution, counted from 0 [default: all colliders]
+    #[arg(long, value_name = "N", value_parser = index)]
+    pub(crate) collider: Option<u32>,
 }
 
 /// Parser of the name of a kind; the help lists the names.

@@ -107,6 +107,7 @@ impl Measurement {
             value: ParameterValue::Number(1.0),
             constraint_kind: None,
             block: None,
+            collider: None,
         };
         print(READY)?;
         while !self.has_ended() {

@@ -122,6 +122,7 @@ fn setting(args: &SetArgs) -> anyhow::Result<Action> {
         value: args.value().map_err(anyhow::Error::msg)?,
         constraint_kind: args.kind.map(KindFilter::Known),
         block: args.block,
+        collider: args.collider,
     })
 }
 
@@ -142,7 +143,13 @@ mod tests {
 
     fn set(name: &str, value: ParameterValue, kind: Option<ConstraintKind>) -> Action {
         let constraint_kind = kind.map(KindFilter::Known);
-        Action::Set { parameter: Text::cut(name), value, constraint_kind, block: None }
+        Action::Set {
+            parameter: Text::cut(name),
+            value,
+            constraint_kind,
+            block: None,
+            collider: None,
+        }
     }
 
     #[test]
@@ -196,6 +203,14 @@ mod tests {
         let number = ParameterValue::Number(1e-4);
         let expected = set("compliance", number, Some(ConstraintKind::Bend));
         assert_eq!(action("set compliance 1e-4 --kind bend"), expected);
+        let of_collider = Action::Set {
+            parameter: Text::cut("friction"),
+            value: ParameterValue::Number(0.3),
+            constraint_kind: None,
+            block: None,
+            collider: Some(2),
+        };
+        assert_eq!(action("set friction 0.3 --collider 2"), of_collider);
         let line = ["sim-node", "ctl", "set", "compliance", "1", "--kind", "knot"];
         let error = try_parse(line).unwrap_err().to_string();
         assert!(error.contains("[possible values: structural, shear, bend, tether]"), "{error}");

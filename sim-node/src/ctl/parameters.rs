@@ -35,6 +35,9 @@ pub(super) fn print(
             let is_value = |name: &str| is_asked(name) || name == BY_BLOCK && is_asked(BENDING);
             object.extend(values.into_iter().filter(|(name, _)| is_value(name)));
         }
+        for (name, values) in of_colliders(client, args, parameter)? {
+            object.insert(name.to_owned(), values.into());
+        }
         return output::json(&Value::Object(object));
     }
     let mut table = Table::new([
@@ -47,7 +50,31 @@ pub(super) fn print(
     for setting in settings.iter().filter(|setting| is_asked(setting.parameter.name())) {
         table.add(cells(setting));
     }
+    for (name, values) in of_colliders(client, args, parameter)? {
+        for (collider, value) in values.iter().enumerate() {
+            let part = format!("collider {collider}");
+            table.add([name.to_owned(), part, value.to_string(), String::new()]);
+        }
+    }
     output::text(&format!("since step {step}\n{}", table.text()))
+}
+
+/// The parameters of colliders, each with its values by collider.
+fn of_colliders(
+    client: &mut Client,
+    args: &CtlArgs,
+    asked: Option<Parameter>,
+) -> anyhow::Result<Vec<(&'static str, Vec<f32>)>> {
+    let is_asked = |one: Parameter| asked.is_none_or(|asked| asked == one);
+    if asked.is_some_and(|asked| !asked.info().is_per_collider) {
+        return Ok(Vec::new());
+    }
+    let colliders = client.colliders(args.timeout())?.colliders;
+    let (friction, restitution) =
+        colliders.iter().map(|one| (one.friction, one.restitution)).unzip();
+    let all = [(Parameter::Friction, friction), (Parameter::Restitution, restitution)];
+    let all = all.into_iter().filter(|(parameter, _)| is_asked(*parameter));
+    Ok(all.map(|(parameter, values)| (parameter.name(), values)).collect())
 }
 
 #[allow(clippy::cast_possible_truncation, reason = "parameters are f32")]

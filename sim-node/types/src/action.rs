@@ -153,6 +153,9 @@ pub enum Action {
         /// Index of the generated block of the affected bends, for `bending`. `None` means all bends.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         block: Option<u32>,
+        /// Index of the affected collider, for `friction` and `restitution`. `None` means all colliders.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        collider: Option<u32>,
     },
     /// Replaces the scene.
     Load {
@@ -292,6 +295,7 @@ impl Action {
             value,
             constraint_kind,
             block: None,
+            collider: None,
         };
         let structural = KindFilter::Known(ConstraintKind::Structural);
         vec![
@@ -322,6 +326,14 @@ impl Action {
                 value: ParameterValue::Number(1e-3),
                 constraint_kind: None,
                 block: Some(1),
+                collider: None,
+            },
+            Self::Set {
+                parameter: Text::cut("friction"),
+                value: ParameterValue::Number(0.25),
+                constraint_kind: None,
+                block: None,
+                collider: Some(2),
             },
             Self::Load { scene: Text::cut("./gemütlich.toml") },
             Self::Rewind { to_step: Some(0x0123_4567_89ab), back_steps: None },
@@ -371,7 +383,13 @@ mod tests {
     }
 
     fn set(name: &str, value: ParameterValue, constraint_kind: Option<KindFilter>) -> Action {
-        Action::Set { parameter: Text::cut(name), value, constraint_kind, block: None }
+        Action::Set {
+            parameter: Text::cut(name),
+            value,
+            constraint_kind,
+            block: None,
+            collider: None,
+        }
     }
 
     fn read(text: &str) -> Action {

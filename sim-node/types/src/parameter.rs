@@ -28,6 +28,8 @@ pub enum Parameter {
     Contact = 15,
     ContactFriction = 16,
     Bending = 17,
+    Friction = 18,
+    Restitution = 19,
 }
 
 /// The value of a parameter. Its JSON form is a number, three numbers or null.
@@ -88,6 +90,8 @@ pub struct ParameterInfo {
     pub off: OffMeaning,
     /// `set` can address the constraints of one kind.
     pub is_per_kind: bool,
+    /// The value belongs to a collider. It is published with the colliders, and `set` can address one of them.
+    pub is_per_collider: bool,
 }
 
 const NUMBER: ParameterInfo = ParameterInfo {
@@ -99,6 +103,7 @@ const NUMBER: ParameterInfo = ParameterInfo {
     default: ParameterValue::Number(0.0),
     off: OffMeaning::NotAllowed,
     is_per_kind: false,
+    is_per_collider: false,
 };
 const VECTOR: ParameterInfo = ParameterInfo {
     form: ValueForm::Vector,
@@ -117,9 +122,11 @@ const SOFTNESS: ParameterInfo = ParameterInfo {
     is_per_kind: true,
     ..NUMBER
 };
+const OF_COLLIDERS: ParameterInfo =
+    ParameterInfo { off: OffMeaning::Zero, is_per_collider: true, ..NUMBER };
 
 /// The table of parameters. The number of a [`Parameter`] is its index here.
-pub const PARAMETERS: [ParameterInfo; 18] = [
+pub const PARAMETERS: [ParameterInfo; 20] = [
     ParameterInfo {
         parameter: Parameter::Gravity,
         name: "gravity",
@@ -238,11 +245,18 @@ pub const PARAMETERS: [ParameterInfo; 18] = [
         is_per_kind: false,
         ..SOFTNESS
     },
+    ParameterInfo { parameter: Parameter::Friction, name: "friction", ..OF_COLLIDERS },
+    ParameterInfo {
+        parameter: Parameter::Restitution,
+        name: "restitution",
+        range: NumberRange::SHARE,
+        ..OF_COLLIDERS
+    },
 ];
 
 impl Parameter {
     /// All parameters, by number.
-    pub const ALL: [Self; 18] = [
+    pub const ALL: [Self; 20] = [
         Self::Gravity,
         Self::Damping,
         Self::WindVelocity,
@@ -261,6 +275,8 @@ impl Parameter {
         Self::Contact,
         Self::ContactFriction,
         Self::Bending,
+        Self::Friction,
+        Self::Restitution,
     ];
 
     /// Returns the parameter with this number.

@@ -24,7 +24,8 @@ pub struct Setting {
 /// 16 parameters have one value, and two have a value for each of the four kinds of constraints.
 pub const SETTINGS_COUNT: usize = 24;
 
-/// The values of all parameters, named as in commands. `None` means off.
+/// The values of all parameters, named as in commands. `None` means off. The values of colliders are not among
+/// them: they are published with the colliders.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[allow(missing_docs, reason = "described in the table of parameters")]
 pub struct ParameterValues {
@@ -154,7 +155,8 @@ impl ParameterValues {
 
     /// Returns all values, by parameter and then by kind, and then those of blocks.
     pub fn settings(&self) -> Vec<Setting> {
-        let keys = Parameter::ALL.into_iter().flat_map(|parameter| {
+        let of_scene = |parameter: &Parameter| !parameter.info().is_per_collider;
+        let keys = Parameter::ALL.into_iter().filter(of_scene).flat_map(|parameter| {
             let kinds: &[Option<ConstraintKind>] =
                 if parameter.info().is_per_kind { &KINDS } else { &[None] };
             kinds.iter().map(move |kind| (parameter, *kind))
@@ -173,7 +175,8 @@ impl ParameterValues {
     }
 
     /// Returns the value of a parameter; the `bending` of blocks without one of their own. `kind` selects
-    /// the value of a parameter with a value for each kind; without it, such a parameter is off.
+    /// the value of a parameter with a value for each kind; without it, such a parameter is off. The parameters of
+    /// colliders are off here, too.
     pub fn get(&self, parameter: Parameter, kind: Option<ConstraintKind>) -> ParameterValue {
         use ParameterValue::{Number, Vector};
         let optional = |value: Option<f32>| value.map_or(ParameterValue::Off, Number);
@@ -196,12 +199,14 @@ impl ParameterValues {
             Parameter::Contact => optional(self.contact),
             Parameter::ContactFriction => Number(self.contact_friction),
             Parameter::Bending => optional(self.bending),
+            Parameter::Friction | Parameter::Restitution => ParameterValue::Off,
         }
     }
 
     /// Stores a value without checks, because the node has checked the values that it publishes. For a
     /// parameter that cannot be off, off means 0. A number does not change a vector, and a vector means
-    /// off for a number. A `bending` without a block replaces those of all blocks.
+    /// off for a number. A `bending` without a block replaces those of all blocks. A parameter of colliders changes
+    /// nothing.
     pub fn set(&mut self, setting: Setting) {
         let Setting { parameter, constraint_kind, block, value } = setting;
         let (number, vector) = match value {
@@ -236,6 +241,7 @@ impl ParameterValues {
                     self.bending_by_block.clear();
                 }
             }
+            Parameter::Friction | Parameter::Restitution => {}
         }
     }
 }
@@ -277,11 +283,16 @@ fn to_count(number: f32) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{OffMeaning, PARAMETERS, ValueForm};
+    use crate::{OffMeaning, PARAMETERS, ParameterInfo, ValueForm};
+
+    /// The parameters whose values are here.
+    fn of_scene() -> impl Iterator<Item = ParameterInfo> {
+        PARAMETERS.into_iter().filter(|info| !info.is_per_collider)
+    }
 
     #[test]
     fn the_defaults_match_the_table() {
-        for info in PARAMETERS {
+        for info in of_scene() {
             assert_eq!(
                 ParameterValues::default().get(info.parameter, Some(ConstraintKind::Shear)),
                 info.default,
@@ -294,7 +305,7 @@ mod tests {
     #[test]
     fn every_setting_survives_a_round_trip() {
         let mut values = ParameterValues::default();
-        for info in PARAMETERS {
+        for info in of_scene() {
             let value = match info.form {
                 ValueForm::Vector => ParameterValue::Vector([0.5, -1.0, 2.0]),
                 ValueForm::Number | ValueForm::Whole => ParameterValue::Number(7.0),
@@ -345,7 +356,7 @@ mod tests {
     #[test]
     fn the_json_names_every_parameter() {
         let json = serde_json::to_value(ParameterValues::default()).unwrap();
-        let names: Vec<_> = PARAMETERS.iter().map(|info| info.name).collect();
+        let names: Vec<_> = of_scene().map(|info| info.name).collect();
         assert!(names.iter().all(|name| json.get(name).is_some()));
         assert_eq!(json.as_object().unwrap().len(), names.len() + 1, "and bending_by_block");
     }

@@ -33,6 +33,7 @@ fn a_new_time_scale_moves_the_step_that_the_node_waits_for() {
         value: ParameterValue::Number(1000.0),
         constraint_kind: None,
         block: None,
+        collider: None,
     };
     let step = client.request(action, DEADLINE).unwrap().step;
     loop {

@@ -19,6 +19,7 @@ fn set_compliance(value: f32) -> Action {
         value,
         constraint_kind: None,
         block: None,
+        collider: None,
     }
 }
 

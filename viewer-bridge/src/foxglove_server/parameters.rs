@@ -19,9 +19,10 @@ const OFF: &str = "off";
 /// Value of a softness that was not set: each constraint has its own.
 const OWN_OF_EACH: &str = "as in the scene";
 
-/// Lists all parameters with their values.
+/// Lists all parameters with their values, except those of colliders, which are in `/colliders`.
 pub(super) fn list(values: &ParameterValues) -> Vec<NamedValue> {
-    Parameter::ALL.into_iter().flat_map(|parameter| named_values(parameter, values)).collect()
+    let of_scene = Parameter::ALL.into_iter().filter(|one| !one.info().is_per_collider);
+    of_scene.flat_map(|parameter| named_values(parameter, values)).collect()
 }
 
 /// Lists the values of one parameter: one, or one for all kinds of constraints and one for each; of `bending`,
@@ -103,16 +104,17 @@ pub(super) fn command(named: &NamedValue) -> Result<Command, Reason> {
         Some((name, part)) => (name, Some(part)),
     };
     let info = Parameter::from_name(name).ok_or(Reason::UnknownParameter)?.info();
-    let (constraint_kind, block) = match part {
-        None => (None, None),
-        Some(block) if info.parameter == Parameter::Bending => {
-            (None, Some(block.parse().map_err(|_| Reason::UnknownParameter)?))
+    let index = |part: &str| part.parse().map(Some).map_err(|_| Reason::UnknownParameter);
+    let (mut constraint_kind, mut block, mut collider) = (None, None, None);
+    match part.map(|part| (part, KindFilter::from_name(part))) {
+        None => {}
+        Some((part, _)) if info.parameter == Parameter::Bending => block = index(part)?,
+        Some((part, _)) if info.is_per_collider => collider = index(part)?,
+        Some((_, known @ KindFilter::Known(_))) if info.is_per_kind => {
+            constraint_kind = Some(known);
         }
-        Some(kind) => match KindFilter::from_name(kind) {
-            known @ KindFilter::Known(_) if info.is_per_kind => (Some(known), None),
-            _ => return Err(Reason::UnknownParameter),
-        },
-    };
+        Some(_) => return Err(Reason::UnknownParameter),
+    }
     let can_be_off =
         matches!(info.off, OffMeaning::Zero | OffMeaning::NoLimit | OffMeaning::Absent);
     let value = match (&named.value, info.form) {
@@ -126,7 +128,14 @@ pub(super) fn command(named: &NamedValue) -> Result<Command, Reason> {
         }
         _ => return Err(Reason::OutOfRange),
     };
-    Ok(Command::Set { parameter: name.to_owned(), value, constraint_kind, block, stroke: None })
+    Ok(Command::Set {
+        parameter: name.to_owned(),
+        value,
+        constraint_kind,
+        block,
+        collider,
+        stroke: None,
+    })
 }
 
 #[allow(clippy::cast_possible_truncation, reason = "the value is rounded once, here")]
@@ -158,6 +167,11 @@ mod tests {
         let all = list(&ParameterValues::default());
         for parameter in Parameter::ALL {
             let name = parameter.name();
+            let is_per_collider = parameter.info().is_per_collider;
+            assert_eq!(all.iter().any(|one| one.name == name), !is_per_collider, "{name}");
+            if is_per_collider {
+                continue;
+            }
             let listed = all.iter().find(|one| one.name == name);
             let listed = listed.unwrap_or_else(|| panic!("{name} is not listed"));
             let is_own = listed.value == Some(FoxgloveValue::String(OWN_OF_EACH.to_owned()));
@@ -200,6 +214,7 @@ mod tests {
             value,
             constraint_kind,
             block: None,
+            collider: None,
             stroke: None,
         };
         let axes = vec![
@@ -218,11 +233,17 @@ mod tests {
         let command = command_for("stiffness.shear", FoxgloveValue::Float64(0.5));
         assert_eq!(command, Ok(set("stiffness", value, kind)));
         let command = command_for("bending.12", FoxgloveValue::Float64(0.5));
-        let (parameter, block) = ("bending".to_owned(), Some(12));
-        assert_eq!(
-            command,
-            Ok(Command::Set { parameter, value, constraint_kind: None, block, stroke: None })
-        );
+        let of_part = |parameter: &str, block, collider| Command::Set {
+            parameter: parameter.to_owned(),
+            value,
+            constraint_kind: None,
+            block,
+            collider,
+            stroke: None,
+        };
+        assert_eq!(command, Ok(of_part("bending", Some(12), None)));
+        let command = command_for("friction.12", FoxgloveValue::Float64(0.5));
+        assert_eq!(command, Ok(of_part("friction", None, Some(12))));
     }
 
     #[test]
@@ -230,6 +251,7 @@ mod tests {
         let number = || FoxgloveValue::Float64(1.0);
         for name in [
             "bending.shear",
+            "friction.shear",
             "bending.-1",
             "",
             "dance",

@@ -38,9 +38,9 @@ pub fn parse(payload: &[u8], epoch: u32) -> Result<Command, String> {
         Action::MoveCollider { collider, translation, rotation } => {
             Command::MoveCollider { collider, translation, rotation }
         }
-        Action::Set { parameter, value, constraint_kind, block } => {
+        Action::Set { parameter, value, constraint_kind, block, collider } => {
             let parameter = parameter.as_str().to_owned();
-            Command::Set { parameter, value, constraint_kind, block, stroke: None }
+            Command::Set { parameter, value, constraint_kind, block, collider, stroke: None }
         }
         Action::Load { scene } => Command::Load { scene: scene.as_str().to_owned() },
         Action::Mark { text } => Command::Mark { text: text.as_str().to_owned() },

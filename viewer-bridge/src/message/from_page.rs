@@ -186,6 +186,8 @@ pub enum Command {
         constraint_kind: Option<KindFilter>,
         #[serde(default)]
         block: Option<u32>,
+        #[serde(default)]
+        collider: Option<u32>,
         /// Changes with the same number are undone together.
         #[serde(default)]
         stroke: Option<u32>,
@@ -403,6 +405,7 @@ mod tests {
             value: ParameterValue::Off,
             constraint_kind: None,
             block: None,
+            collider: None,
             stroke: None,
         };
         assert_eq!(FromPage::parse(text), Ok(FromPage::Command { id: None, command }));

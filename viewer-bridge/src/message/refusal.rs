@@ -14,7 +14,7 @@ pub enum Refusal {
     Node(Reason),
     /// The node refused a value of this parameter.
     OutsideRange(Parameter),
-    /// The node refused a value or the block of this parameter.
+    /// The node refused a value or the block of this parameter, or a collider that it does not have.
     OutsideBlocks(Parameter),
     /// The node gave a reason that this version does not know.
     Unknown,
@@ -64,14 +64,18 @@ impl Refusal {
     /// The reason for which the node refused an action.
     pub(crate) fn of_action(reason: Reason, action: &Action) -> Self {
         let parameter = match action {
-            Action::Set { parameter, block, .. } => {
-                Parameter::from_name(parameter.as_str()).map(|parameter| (parameter, *block))
+            Action::Set { parameter, block, collider, .. } => {
+                let has_part = |parameter: Parameter| {
+                    block.is_some() || (collider.is_some() && !parameter.info().is_per_collider)
+                };
+                let parameter = Parameter::from_name(parameter.as_str());
+                parameter.map(|parameter| (parameter, has_part(parameter)))
             }
             _ => None,
         };
         match (reason, parameter) {
-            (Reason::OutOfRange, Some((parameter, None))) => Self::OutsideRange(parameter),
-            (Reason::OutOfRange, Some((parameter, Some(_)))) => Self::OutsideBlocks(parameter),
+            (Reason::OutOfRange, Some((parameter, false))) => Self::OutsideRange(parameter),
+            (Reason::OutOfRange, Some((parameter, true))) => Self::OutsideBlocks(parameter),
             _ => Self::Node(reason),
         }
     }
@@ -118,7 +122,8 @@ impl Refusal {
                 return format!("{name} of a block accepts {range}, for a shape with bends").into();
             }
             Self::OutsideBlocks(parameter) => {
-                return format!("{} has no values for blocks", parameter.name()).into();
+                return format!("{} has no values for blocks or colliders", parameter.name())
+                    .into();
             }
             Self::Unknown => "the node gave an unknown reason",
             Self::NoNode => "no node is running; start one with `sim-node run`",
@@ -237,14 +242,20 @@ mod tests {
         );
         let of_block = |name: &str| {
             let (parameter, value) = (Text::cut(name), ParameterValue::Number(1.0));
-            let set = Action::Set { parameter, value, constraint_kind: None, block: Some(7) };
+            let set = Action::Set {
+                parameter,
+                value,
+                constraint_kind: None,
+                block: Some(7),
+                collider: None,
+            };
             Refusal::of_action(Reason::OutOfRange, &set).text("set")
         };
         assert_eq!(
             of_block("bending"),
             "bending of a block accepts a number >= 0, for a shape with bends"
         );
-        assert_eq!(of_block("damping"), "damping has no values for blocks");
+        assert_eq!(of_block("damping"), "damping has no values for blocks or colliders");
         assert!(Refusal::UnknownScene.text("load").contains("sim-node scenes"));
     }
 }

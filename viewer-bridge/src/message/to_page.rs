@@ -179,11 +179,23 @@ pub struct ParametersText {
     pub values: Option<ParameterValues>,
     /// Values of the scene.
     pub initial: Option<ParameterValues>,
+    /// Friction and restitution of each collider in the scene. COLLIDERS has the present ones.
+    pub initial_colliders: Vec<ColliderSurface>,
+}
+
+/// Friction and restitution of a collider.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ColliderSurface {
+    /// Coulomb's coefficient.
+    pub friction: f32,
+    /// Fraction of the approach speed with which a particle bounces.
+    pub restitution: f32,
 }
 
 impl ParametersText {
     /// The message without a scene.
-    pub(crate) const UNKNOWN: Self = Self { is_complete: false, values: None, initial: None };
+    pub(crate) const UNKNOWN: Self =
+        Self { is_complete: false, values: None, initial: None, initial_colliders: Vec::new() };
 }
 
 /// Fate of a command.

@@ -4,9 +4,10 @@ use std::ops::Range;
 
 use sim_contract::ParameterValues;
 use sim_solver::Scene;
-use sim_solver::scene::{ColliderMeshes, ScenePoses, Shape, Up};
+use sim_solver::scene::{ColliderMeshes, SceneCollider, ScenePoses, Shape, Up};
 
 use crate::limits::SHAPES_MAX;
+use crate::message::ColliderSurface;
 use crate::wire::ShapeText;
 
 /// The part of a scene that a viewer needs.
@@ -24,6 +25,8 @@ pub struct SceneSummary {
     pub rate_hz: u32,
     /// Values of the parameters.
     pub parameters: ParameterValues,
+    /// Friction and restitution of each collider.
+    pub surfaces: Vec<ColliderSurface>,
     /// Triangles of the colliders that are meshes.
     pub collider_meshes: ColliderMeshes,
     /// The generated shapes, at most [`SHAPES_MAX`]. The load says which of them have bends.
@@ -39,6 +42,7 @@ impl SceneSummary {
         let scene = Scene::from_toml(text, "").ok()?;
         Some(Self {
             parameters: parameters(&scene),
+            surfaces: scene.colliders.iter().map(surface).collect(),
             collider_meshes: scene.collider_meshes(),
             shapes: scene.shapes().take(SHAPES_MAX).map(shape_text).collect(),
             poses: ScenePoses::new(&scene),
@@ -61,6 +65,7 @@ impl Default for SceneSummary {
             is_planar: false,
             rate_hz: 0,
             parameters: ParameterValues::default(),
+            surfaces: Vec::new(),
             collider_meshes: ColliderMeshes::new(),
             shapes: Vec::new(),
             poses: ScenePoses::default(),
@@ -75,6 +80,10 @@ fn shape_text((shape, particles): (&Shape, Range<u64>)) -> ShapeText {
         count: particles.end - particles.start,
         has_bends: false,
     }
+}
+
+fn surface(collider: &SceneCollider) -> ColliderSurface {
+    ColliderSurface { friction: collider.friction, restitution: collider.restitution }
 }
 
 fn parameters(scene: &Scene) -> ParameterValues {

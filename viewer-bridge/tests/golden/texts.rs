@@ -3,9 +3,9 @@
 use serde_json::{Value, json};
 use sim_contract::{ParameterValues, Reason};
 use viewer_bridge::message::{
-    Choice, FromPage, GhostState, GhostText, Hashes, HistoryText, Level, Mark, MarkKind, Mode,
-    Node, NodeState, OutcomeText, PageLimits, ParametersText, Playback, RecordingState,
-    RecordingText, Refusal, Status, Timeline, ToPage, Undoable, Welcome,
+    Choice, ColliderSurface, FromPage, GhostState, GhostText, Hashes, HistoryText, Level, Mark,
+    MarkKind, Mode, Node, NodeState, OutcomeText, PageLimits, ParametersText, Playback,
+    RecordingState, RecordingText, Refusal, Status, Timeline, ToPage, Undoable, Welcome,
 };
 use viewer_bridge::scene::catalog::Catalog;
 
@@ -52,6 +52,7 @@ fn to_page() -> Vec<ToPage> {
             is_complete: true,
             values: Some(parameters),
             initial: Some(ParameterValues::default()),
+            initial_colliders: vec![ColliderSurface { friction: 0.5, restitution: 0.25 }],
         })),
         ToPage::Outcome(outcome.clone()),
         ToPage::Outcome(OutcomeText {

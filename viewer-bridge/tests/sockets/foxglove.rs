@@ -117,7 +117,12 @@ impl FoxgloveSite {
     }
 
     fn set_parameters(&self, values: ParameterValues) {
-        let text = ParametersText { is_complete: true, values: Some(values), initial: None };
+        let text = ParametersText {
+            is_complete: true,
+            values: Some(values),
+            initial: None,
+            initial_colliders: Vec::new(),
+        };
         self.sinks.publish(&Update::Parameters(&text));
     }
 

@@ -15,9 +15,10 @@ test("the example of each field is accepted, and optional fields can be absent",
 
 test("values are numbers, vectors, texts or off", () => {
   assert.deepEqual(messageOf("push", ["0, 1 ,2.5", "2e-1", "0 0  -1", ""], 3), { fields: { center: [0, 1, 2.5], radius: 0.2, delta: [0, 0, -1] } });
-  assert.deepEqual(messageOf("set", ["tear_force", "off", "", ""], 3), { fields: { parameter: "tear_force", value: null } });
-  assert.deepEqual(messageOf("set", ["gravity", "0 -9.81 0", "", ""], 3), { fields: { parameter: "gravity", value: [0, -9.81, 0] } });
-  assert.deepEqual(messageOf("set", ["bending", "1e-3", "", "2"], 3), { fields: { parameter: "bending", value: 1e-3, block: 2 } });
+  assert.deepEqual(messageOf("set", ["tear_force", "off", "", "", ""], 3), { fields: { parameter: "tear_force", value: null } });
+  assert.deepEqual(messageOf("set", ["gravity", "0 -9.81 0", "", "", ""], 3), { fields: { parameter: "gravity", value: [0, -9.81, 0] } });
+  assert.deepEqual(messageOf("set", ["bending", "1e-3", "", "2", ""], 3), { fields: { parameter: "bending", value: 1e-3, block: 2 } });
+  assert.deepEqual(messageOf("set", ["friction", "0.3", "", "", "2"], 3), { fields: { parameter: "friction", value: 0.3, collider: 2 } });
   assert.deepEqual(messageOf("cut", ["17"], 3), { fields: { epoch: 3, constraints: [17] } });
   assert.deepEqual(messageOf("pause", [], 3), { fields: {} });
 });

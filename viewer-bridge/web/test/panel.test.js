@@ -2,7 +2,7 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { ROWS, SLIDER_STEPS, editable, hasBends, partsOf, positionOf, rangeOf, restoring, rowsOf, typedValue, unitOf, valueAt } from "../js/panel/parameters.js";
+import { ROWS, SLIDER_STEPS, editable, hasBends, partsOf, positionOf, rangeOf, restoring, rowsOf, typedValue, unitOf, valueAt, withSurfaces } from "../js/panel/parameters.js";
 import { valueOf } from "../js/net/messages.js";
 import { niceCeiling } from "../js/geometry/round.js";
 import { readable } from "../js/ui/format.js";
@@ -109,4 +109,20 @@ test("the bending of a block is its own, or that of all bends, and no command re
   assert.deepEqual(restoring([row("bending")], values, initial, []), { changes: [], lost: ["Bending"] });
   assert.deepEqual(restoring([row("bending")], { ...values, bending: null }, initial, []), { changes: [], lost: ["Bending"] });
   assert.deepEqual(restoring([row("bending")], initial, initial, []), { changes: [], lost: [] });
+});
+
+test("a scene with colliders has rows for their friction and restitution, with a choice of the collider", () => {
+  const names = (hasColliders) => rowsOf("xpbd", false, hasColliders).map((row) => row.name);
+  for (const name of ["friction", "restitution"]) assert.deepEqual([true, false].map((has) => names(has).includes(name)), [true, false]);
+  const colliders = [{ index: 0, shape: "plane", friction: 0.5, restitution: 0 }, { index: 1, shape: "box", friction: 0.25, restitution: 0 }];
+  const none = { shapes: [], hasExplicitBends: false };
+  assert.deepEqual(partsOf(row("friction"), none, [], colliders), [{ part: "0", text: "0 plane" }, { part: "1", text: "1 box" }]);
+  assert.deepEqual(partsOf(row("friction"), none, [], colliders.slice(1)), [], "all is the same");
+  const values = withSurfaces({ damping: 1 }, colliders);
+  assert.deepEqual(["all", "0", "1"].map((part) => valueOf(values, "friction", part)), [null, 0.5, 0.25]);
+  assert.deepEqual(["all", "1"].map((part) => valueOf(values, "restitution", part)), [0, 0]);
+  assert.equal(values.damping, 1);
+  assert.equal(withSurfaces(null, colliders), null);
+  const initial = withSurfaces({ damping: 1 }, [colliders[0], { ...colliders[1], friction: 0.75 }]);
+  assert.deepEqual(restoring([row("friction"), row("restitution")], values, initial, []), { changes: [{ name: "friction", value: 0.75, part: "1" }], lost: [] });
 });

@@ -61,11 +61,11 @@ impl Request {
             Action::Rewind { to_step: None, back_steps: Some(count) } => {
                 Self::Seek(Target::BackSteps(count.into()))
             }
-            Action::Set { parameter, value, constraint_kind, block } => {
+            Action::Set { parameter, value, constraint_kind, block, collider } => {
                 if Parameter::from_name(parameter.as_str()) != Some(Parameter::TimeScale) {
                     return Err(Reason::NoEffectHere);
                 }
-                let is_of_some = constraint_kind.is_some() || block.is_some();
+                let is_of_some = constraint_kind.is_some() || block.is_some() || collider.is_some();
                 Self::Rate(rate(value).filter(|_| !is_of_some).ok_or(Reason::OutOfRange)?)
             }
             _ => return Err(Reason::NoEffectHere),
@@ -131,7 +131,13 @@ mod tests {
 
     fn set(parameter: &str, value: f32) -> Action {
         let value = ParameterValue::Number(value);
-        Action::Set { parameter: Text::cut(parameter), value, constraint_kind: None, block: None }
+        Action::Set {
+            parameter: Text::cut(parameter),
+            value,
+            constraint_kind: None,
+            block: None,
+            collider: None,
+        }
     }
 
     #[test]
@@ -189,8 +195,10 @@ mod tests {
         }
         let Action::Set { parameter, value, .. } = set("time_scale", 1.0) else { unreachable!() };
         let constraint_kind = Some(KindFilter::Unknown);
-        let of_kind = Action::Set { parameter, value, constraint_kind, block: None };
-        let of_block = Action::Set { parameter, value, constraint_kind: None, block: Some(0) };
+        let of_kind =
+            Action::Set { parameter, value, constraint_kind, block: None, collider: None };
+        let of_block =
+            Action::Set { parameter, value, constraint_kind: None, block: Some(0), collider: None };
         for action in [of_kind, of_block] {
             assert_eq!(Request::from_action(&action), Err(Reason::OutOfRange));
         }

@@ -26,10 +26,11 @@ pub(super) struct Changes {
 }
 
 /// Parses `STEP:PARAMETER=VALUE`, such as `480:damping=0.1` or `0:gravity=[0,-5,0]`. A parameter can be for one kind
-/// of constraint, such as `compliance.shear`, or for one generated block, such as `bending.1`.
+/// of constraint, such as `compliance.shear`, for one generated block, such as `bending.1`, or for one collider, such as
+/// `friction.2`.
 pub(super) fn parse_setting(text: &str) -> Result<TimedCommand, String> {
     const FORM: &str = "it must be STEP:PARAMETER=VALUE, such as 480:damping=0.1, \
-        480:gravity=[0,-5,0], 480:max_speed=off, 480:compliance.shear=1e-4 or 480:bending.1=1e-3";
+        480:gravity=[0,-5,0], 480:max_speed=off, 480:compliance.shear=1e-4, 480:bending.1=1e-3 or 480:friction.2=0.5";
     let (step, setting) = text.split_once(':').ok_or(FORM)?;
     let step: u64 = step.trim().parse().map_err(|_| FORM)?;
     let (parameter, value) = setting.split_once('=').ok_or(FORM)?;
@@ -46,7 +47,11 @@ pub(super) fn parse_setting(text: &str) -> Result<TimedCommand, String> {
     });
     match part.map(|part| (part, part.parse::<u32>())) {
         None => {}
-        Some((_, Ok(block))) => line["block"] = block.into(),
+        Some((_, Ok(index))) => {
+            let named = Parameter::from_name(parameter);
+            let is_per_collider = named.is_some_and(|one| one.info().is_per_collider);
+            line[if is_per_collider { "collider" } else { "block" }] = index.into();
+        }
         Some((kind, Err(_))) => line["constraint_kind"] = kind.into(),
     }
     let commands = parse_commands(&line.to_string(), "--set").map_err(|error| error.to_string())?;
@@ -62,16 +67,19 @@ pub(super) fn parse_setting(text: &str) -> Result<TimedCommand, String> {
 
 /// Returns the reason for which every scene rejects a `set`. Others depend on the scene.
 fn wrong_in_every_scene(action: &Action) -> Option<Reason> {
-    let Action::Set { parameter, value, constraint_kind, block } = action else { return None };
+    let Action::Set { parameter, value, constraint_kind, block, collider } = action else {
+        return None;
+    };
     let Some(parameter) = Parameter::from_name(parameter.as_str()) else {
         return Some(Reason::UnknownParameter);
     };
     let info = parameter.info();
-    let has_part = match constraint_kind {
-        Some(KindFilter::Known(_)) => info.is_per_kind,
-        Some(KindFilter::Unknown) => false,
-        None => block.is_none() || parameter == Parameter::Bending,
-    };
+    let has_part = (collider.is_none() || info.is_per_collider)
+        && match constraint_kind {
+            Some(KindFilter::Known(_)) => info.is_per_kind,
+            Some(KindFilter::Unknown) => false,
+            None => block.is_none() || parameter == Parameter::Bending,
+        };
     if !has_part {
         return Some(Reason::OutOfRange);
     }
@@ -337,16 +345,21 @@ mod tests {
             assert!(parse_setting(text).unwrap_err().starts_with("it must be STEP:"), "{text}");
         }
         let part = |text: &str| match parse_setting(text).unwrap().action {
-            Action::Set { constraint_kind, block, .. } => (constraint_kind, block),
+            Action::Set { constraint_kind, block, collider, .. } => {
+                (constraint_kind, block, collider)
+            }
             other => panic!("{other:?}"),
         };
-        assert_eq!(part("3:bending.12=1e-3"), (None, Some(12)));
+        assert_eq!(part("3:bending.12=1e-3"), (None, Some(12), None));
+        assert_eq!(part("3:friction.12=0.5"), (None, None, Some(12)));
         let shear = KindFilter::Known(ConstraintKind::Shear);
-        assert_eq!(part("3:compliance.shear=1e-3"), (Some(shear), None));
+        assert_eq!(part("3:compliance.shear=1e-3"), (Some(shear), None, None));
         for (text, allowed) in [
             ("3:compliance.silk=1", "for one kind or all"),
             ("3:damping.shear=1", "no kind"),
             ("3:damping.1=1", "no block"),
+            ("3:restitution.1=2", "0 to 1"),
+            ("3:friction.shear=1", "no kind"),
         ] {
             let error = parse_setting(text).unwrap_err();
             assert!(error.contains(allowed), "{error}");

@@ -28,7 +28,7 @@ pub const CONSOLE_CLIENT_ID: u64 = 0;
 /// | 13 cut_segment | | from, to, direction | |
 /// | 14 move_anchor | anchor | translation | `rotation` |
 /// | 15 move_collider | collider | translation | `rotation` |
-/// | 16 set | block | value, if a vector | `text` parameter, `number` value, `count` constraint kind |
+/// | 16 set | block or collider | value, if a vector | `text` parameter, `number` value, `count` constraint kind |
 /// | 17 load | | | `text` scene |
 /// | 18 rewind | step, low 32 bits | | `count` step, high 32 bits; or [`CommandOptions::BACK`] and `count` steps |
 /// | 19 restore | hash, low 32 bits | | `count` hash, high 32 bits; [`CommandOptions::STATE`] or [`CommandOptions::MOTION`] |
@@ -41,7 +41,7 @@ pub struct Command {
     /// Number of the action in the table above.
     pub kind: u32,
     /// Index of the particle, constraint, anchor, collider or, if [`CommandOptions::BLOCK`] is set, generated
-    /// block.
+    /// block. A set has a collider only with [`CommandOptions::COLLIDER`].
     pub index: u32,
     /// Random number of the sender, below 2^53 (exact in JSON); [`CONSOLE_CLIENT_ID`] is the console.
     pub client_id: u64,
@@ -101,6 +101,8 @@ impl CommandOptions {
     pub const MOTION: u32 = 1 << 9;
     /// A set addresses the bends of one generated block.
     pub const BLOCK: u32 = 1 << 10;
+    /// A set addresses one collider.
+    pub const COLLIDER: u32 = 1 << 11;
 
     const VALUE_ANY: u32 = Self::VALUE_NUMBER | Self::VALUE_VECTOR | Self::VALUE_OFF;
 }
@@ -181,8 +183,11 @@ impl Command {
                 rotation,
                 ..Self::with_kind(kind::MOVE_COLLIDER, collider).with_vector(translation, 0.0)
             },
-            Action::Set { parameter, value, constraint_kind, block } => {
-                Self::from_value(value).with_parameter(parameter).with_part(constraint_kind, block)
+            Action::Set { parameter, value, constraint_kind, block, collider } => {
+                let set = Self::from_value(value).with_parameter(parameter);
+                set.with_constraints(constraint_kind)
+                    .with_index(block, CommandOptions::BLOCK)
+                    .with_index(collider, CommandOptions::COLLIDER)
             }
             Action::Load { scene } => {
                 Self { text: scene.to_wire(), ..Self::with_kind(kind::LOAD, 0) }
@@ -280,18 +285,18 @@ impl Command {
         Self { text: parameter.to_wire(), ..self }
     }
 
-    /// Restricts a set to the constraints of a kind, or to the bends of a generated block.
-    fn with_part(self, constraint_kind: Option<KindFilter>, block: Option<u32>) -> Self {
-        let mut command = self;
-        if let Some(kind) = constraint_kind {
-            command.count = kind.number();
-            command.options |= CommandOptions::CONSTRAINT_KIND;
-        }
-        if let Some(block) = block {
-            command.index = block;
-            command.options |= CommandOptions::BLOCK;
-        }
-        command
+    /// Restricts a set to the constraints of a kind.
+    fn with_constraints(self, constraint_kind: Option<KindFilter>) -> Self {
+        let Some(kind) = constraint_kind else { return self };
+        let options = self.options | CommandOptions::CONSTRAINT_KIND;
+        Self { count: kind.number(), options, ..self }
+    }
+
+    /// Restricts a set to the bends of a generated block, or to a collider. A command with both keeps the index of
+    /// the last one. It is rejected in either form.
+    fn with_index(self, index: Option<u32>, option: u32) -> Self {
+        let Some(index) = index else { return self };
+        Self { index, options: self.options | option, ..self }
     }
 
     /// Decodes the action. A kind that this version does not know, or a set without exactly one value,
@@ -384,6 +389,7 @@ impl Command {
             value,
             constraint_kind: has_kind.then(|| KindFilter::from_number(self.count)),
             block: self.has(CommandOptions::BLOCK).then_some(self.index),
+            collider: self.has(CommandOptions::COLLIDER).then_some(self.index),
         }
     }
 
@@ -438,7 +444,8 @@ mod tests {
     fn a_set_without_a_value_or_with_two_values_is_unknown() {
         let value = ParameterValue::Number(1.0);
         let parameter = Text::cut("damping");
-        let action = Action::Set { parameter, value, constraint_kind: None, block: None };
+        let action =
+            Action::Set { parameter, value, constraint_kind: None, block: None, collider: None };
         let valid = Command::new(0, 0, action);
         for options in [0, CommandOptions::VALUE_NUMBER | CommandOptions::VALUE_OFF] {
             let command = Command { options, ..valid };
@@ -451,7 +458,7 @@ mod tests {
         let value = ParameterValue::Number(1.0);
         let constraint_kind = Some(KindFilter::Unknown);
         let parameter = Text::cut("compliance");
-        let action = Action::Set { parameter, value, constraint_kind, block: None };
+        let action = Action::Set { parameter, value, constraint_kind, block: None, collider: None };
         let command = Command { count: 4, ..Command::new(0, 0, action) };
         assert_eq!(command.action(), action);
     }

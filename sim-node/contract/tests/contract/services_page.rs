@@ -280,7 +280,7 @@ fn state_numbers() -> [Numbers; 10] {
     ]
 }
 
-const OPTIONS: [(u32, &str); 11] = [
+const OPTIONS: [(u32, &str); 12] = [
     (CommandOptions::LIMIT, "limit"),
     (CommandOptions::VALUE_NUMBER, "value is a number"),
     (CommandOptions::VALUE_VECTOR, "value is a vector"),
@@ -292,6 +292,7 @@ const OPTIONS: [(u32, &str); 11] = [
     (CommandOptions::STATE, "state"),
     (CommandOptions::MOTION, "motion"),
     (CommandOptions::BLOCK, "block"),
+    (CommandOptions::COLLIDER, "collider"),
 ];
 
 #[test]

@@ -340,6 +340,7 @@ class Action:
         value: float | Vector | None,
         kind: str | None = None,
         block: int | None = None,
+        collider: int | None = None,
     ) -> Action: ...
     @staticmethod
     def load(scene: str | PathLike[str]) -> Action: ...

@@ -114,8 +114,9 @@ class Commands(ABC, Generic[Result]):
 
         `compliance` and `stiffness` take a number for all constraints, or a dict with a number for each kind,
         such as `{"shear": 0.5}`. `bending` replaces the rigidity of all bends, or with a dict that of the bends of
-        some generated blocks, such as `{1: 1e-3}` for the second one. Each value is a command of its own, in the
-        order given; the result is that of the last one.
+        some generated blocks, such as `{1: 1e-3}` for the second one. `friction` and `restitution` change all
+        colliders, or with a dict some of them, such as `{2: 0.3}`. Each value is a command of its own, in the order
+        given; the result is that of the last one.
         """
         actions = [action for name, value in values.items() for action in _settings(name, value)]
         if not actions:
@@ -127,17 +128,27 @@ class Commands(ABC, Generic[Result]):
         return self._perform(Action.mark(text))
 
 
+# The part of the scene that an index in a dict names.
+_PARTS = {
+    "bending": "a block, such as {1: 1e-3}",
+    "friction": "a collider, such as {2: 0.3}",
+    "restitution": "a collider, such as {2: 0.3}",
+}
+
+
 def _settings(name: str, value: Any) -> list[Action]:
     if not isinstance(value, Mapping):
         return [Action.set(name, value)]
     if not value:
-        part = "a block, such as {1: 1e-3}" if name == "bending" else "a kind, such as {'shear': 0.5}"
+        part = _PARTS.get(name, "a kind, such as {'shear': 0.5}")
         raise TypeError(f"`{name}` is empty: give a number for {part}")
     return [_setting_of(name, part, number) for part, number in value.items()]
 
 
 def _setting_of(name: str, part: Any, value: Any) -> Action:
-    """The command for a kind of constraint, or for a generated block."""
+    """The command for a kind of constraint, a collider or a generated block."""
     if isinstance(part, str):
         return Action.set(name, value, kind=part)
+    if "collider" in _PARTS.get(name, ""):
+        return Action.set(name, value, collider=part)
     return Action.set(name, value, block=part)

@@ -159,18 +159,20 @@ impl Action {
     }
 
     #[staticmethod]
-    #[pyo3(signature = (parameter, value, kind=None, block=None))]
+    #[pyo3(signature = (parameter, value, kind=None, block=None, collider=None))]
     fn set(
         parameter: &str,
         value: &Bound<'_, PyAny>,
         kind: Option<&str>,
         block: Option<u32>,
+        collider: Option<u32>,
     ) -> PyResult<Self> {
         Ok(Self(sim_contract::Action::Set {
             parameter: text(parameter)?,
             value: parameter_value(value)?,
             constraint_kind: kind.map(constraint_kind).transpose()?,
             block,
+            collider,
         }))
     }
 

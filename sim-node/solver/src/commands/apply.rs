@@ -105,8 +105,8 @@ impl Solver {
                 self.drive_body(collider, Pose { translation, rotation }, &motion)?;
                 return Ok(Applied::Target);
             }
-            Action::Set { parameter, value, constraint_kind, block } => {
-                let target = Target::new(constraint_kind, block)?;
+            Action::Set { parameter, value, constraint_kind, block, collider } => {
+                let target = Target::new(constraint_kind, block, collider)?;
                 return self.apply_setting(parameter.as_str(), value, target);
             }
             Action::Reset => {

@@ -25,8 +25,8 @@ impl Solver {
                     let basis = self.settings.has_tethers().then(|| self.initial_tether_basis());
                     return self.plan_for(&self.initial_parameters, &[], basis);
                 }
-                Action::Set { parameter, value, constraint_kind, block } => {
-                    let target = Target::new(constraint_kind, block);
+                Action::Set { parameter, value, constraint_kind, block, collider } => {
+                    let target = Target::new(constraint_kind, block, collider);
                     // A rejected setting changes nothing.
                     let set = target.and_then(|target| {
                         parameters.set(parameter.as_str(), value, target, self.context())

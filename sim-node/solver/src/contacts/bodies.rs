@@ -87,8 +87,8 @@ impl BodyContacts {
         substep: &ContactSubstep,
     ) -> Reaction {
         let surface = BodySurface {
-            restitution: collider.restitution,
-            friction: collider.friction,
+            restitution: collider.surface.restitution,
+            friction: collider.surface.friction,
             rest_distance: substep.rest_speed * substep.h,
         };
         // Its pose is that at the end of the substep.

@@ -10,6 +10,7 @@ use super::contact_substep::ContactSubstep;
 use super::mesh::collision_mesh::CollisionMesh;
 use super::placed_shape::PlacedShape;
 use crate::frame::{Frame, angular_velocity, rotation_about};
+use crate::parameters::surfaces::ColliderSurface;
 use crate::scene::definition::collider::{ColliderBody, ColliderGeometry, SceneCollider};
 
 /// A collider and its motion.
@@ -18,8 +19,8 @@ pub(crate) struct Collider {
     at_load: PlacedShape,
     /// The triangles of a mesh.
     pub(crate) mesh: Option<Arc<CollisionMesh>>,
-    pub(crate) restitution: f32,
-    pub(crate) friction: f32,
+    /// Friction and restitution by the parameters.
+    pub(crate) surface: ColliderSurface,
     velocity: DVec3,
     angular_velocity: DVec3,
     pub(crate) body: Option<ColliderBody>,
@@ -58,8 +59,7 @@ impl Collider {
         Self {
             at_load: PlacedShape::new(&scene.shape),
             mesh: scene.mesh.as_ref().map(|mesh| Arc::new(CollisionMesh::new(mesh, index))),
-            restitution: scene.restitution,
-            friction: scene.friction,
+            surface: ColliderSurface::from(scene),
             velocity: Vec3::from_array(scene.velocity).as_dvec3(),
             angular_velocity: Vec3::from_array(scene.angular_velocity).as_dvec3(),
             body: scene.body,
@@ -189,8 +189,8 @@ impl Collider {
     pub(crate) fn placed(&self) -> PlacedCollider {
         PlacedCollider {
             shape: self.shape_at(1.0).to_scene(),
-            restitution: self.restitution,
-            friction: self.friction,
+            restitution: self.surface.restitution,
+            friction: self.surface.friction,
             velocity: self.linear.to_array(),
             angular_velocity: self.angular.to_array(),
         }

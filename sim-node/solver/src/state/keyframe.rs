@@ -10,11 +10,14 @@ use crate::constraints::tethers::TetherBasis;
 use crate::frame::{Frame, Pose};
 use crate::parameters::Parameters;
 use crate::parameters::block_bending::BlockBending;
+use crate::parameters::surfaces::{ColliderSurface, Surfaces};
 use crate::solver::Solver;
 use crate::step::drive::ActiveGrab;
 
 /// First four bytes of an encoded keyframe, little-endian. It changes with the fields below.
-const KEYFRAME_VERSION: u32 = 4;
+const KEYFRAME_VERSION: u32 = 5;
+/// The version before the surfaces of colliders could change.
+const WITHOUT_SURFACES_VERSION: u32 = 4;
 /// The version before blocks could have a bending of their own.
 const WITHOUT_BLOCKS_VERSION: u32 = 3;
 
@@ -83,7 +86,7 @@ pub enum KeyframeError {
     TooLong(usize),
     /// Another version wrote it.
     #[error(
-        "keyframe version {found}; this program reads versions {WITHOUT_BLOCKS_VERSION} and {KEYFRAME_VERSION}"
+        "keyframe version {found}; this program reads versions {WITHOUT_BLOCKS_VERSION} to {KEYFRAME_VERSION}"
     )]
     Version {
         /// The version in the bytes.
@@ -128,6 +131,7 @@ impl Keyframe {
             + size_of_val(self.moved_anchors.as_slice())
             + size_of_val(self.moved_colliders.as_slice())
             + self.parameters.block_bending.size_bytes()
+            + size_of_val(self.parameters.surfaces.all())
     }
 
     /// Returns the cause of each tear in [`Self::torn`].
@@ -136,18 +140,20 @@ impl Keyframe {
     }
 
     /// Encodes the keyframe: its version as a little-endian u32, then the fields in postcard's
-    /// encoding, and the bending of each generated block.
+    /// encoding, the bending of each generated block, and the surface of each collider.
     ///
     /// # Panics
     /// Never: the fields always have an encoding.
     #[allow(clippy::expect_used, reason = "encoding numbers into a growing Vec cannot fail")]
     pub fn encode(&self) -> Vec<u8> {
         let bytes = KEYFRAME_VERSION.to_le_bytes().to_vec();
-        let fields = (self, self.parameters.block_bending.used());
+        let Parameters { block_bending, surfaces, .. } = &self.parameters;
+        let fields = (self, block_bending.used(), surfaces.all());
         postcard::to_extend(&fields, bytes).expect("numbers have an encoding")
     }
 
-    /// Decodes the bytes of [`Self::encode`], also those of version 3, in which no block has a bending of its own.
+    /// Decodes the bytes of [`Self::encode`], also those of version 4, in which colliders have the surfaces of the
+    /// scene, and of version 3, in which no block has a bending of its own either.
     ///
     /// # Errors
     /// Another version wrote the bytes, or they are damaged.
@@ -157,15 +163,24 @@ impl Keyframe {
         };
         let (keyframe, rest) = match u32::from_le_bytes(*version) {
             KEYFRAME_VERSION => {
-                let ((mut keyframe, blocks), rest) =
-                    postcard::take_from_bytes::<(Self, Vec<Option<f32>>)>(fields)?;
-                keyframe.parameters.block_bending = BlockBending::from_used(blocks);
-                (keyframe, rest)
+                let ((keyframe, blocks, surfaces), rest) = postcard::take_from_bytes(fields)?;
+                (Self::with(keyframe, blocks, surfaces), rest)
+            }
+            WITHOUT_SURFACES_VERSION => {
+                let ((keyframe, blocks), rest) = postcard::take_from_bytes(fields)?;
+                (Self::with(keyframe, blocks, Vec::new()), rest)
             }
             WITHOUT_BLOCKS_VERSION => postcard::take_from_bytes(fields)?,
             found => return Err(KeyframeError::Version { found }),
         };
         if rest.is_empty() { Ok(keyframe) } else { Err(KeyframeError::TooLong(rest.len())) }
+    }
+
+    /// Adds the parts that are encoded behind the other fields.
+    fn with(mut self, blocks: Vec<Option<f32>>, surfaces: Vec<ColliderSurface>) -> Self {
+        self.parameters.block_bending = BlockBending::from_used(blocks);
+        self.parameters.surfaces = Surfaces::from_all(surfaces);
+        self
     }
 }
 
@@ -209,10 +224,12 @@ impl Solver {
         let (torn, cause, moved) = (link, 1, 5 + 12 + 16);
         let (root, basis) = if self.settings.has_tethers() { (index, link) } else { (0, 0) };
         let parameters = 2 * 12 + 4 * 4 + 2 * 5 + 9 * 5 + 10 + self.model.bent_blocks.len() * 5;
-        let head = 4 + 1 + 10 + 8 * 10 + parameters;
+        let surface = 2 * 4;
+        let head = 4 + 1 + 10 + 9 * 10 + parameters;
         head + self.particle_count() * (fixed + grab + root)
             + self.constraint_count() * (torn + cause + basis)
             + (self.anchor_count() + self.collider_count()) * moved
+            + self.collider_count() * surface
     }
 
     fn is_fixed(&self, particle: u32) -> bool {

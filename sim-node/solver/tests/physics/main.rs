@@ -16,6 +16,7 @@ mod hardening;
 mod motion;
 mod order;
 mod parameters;
+mod surfaces;
 mod tearing;
 mod tethers;
 mod wind;

@@ -19,8 +19,12 @@ impl ParameterInfo {
             OffMeaning::Absent => ", or off for none",
             OffMeaning::NotAllowed | OffMeaning::OwnOfEach => "",
         };
-        let kind = if self.is_per_kind { ", for one kind or all" } else { "" };
-        format!("{values}{off}{kind}")
+        let part = match self {
+            Self { is_per_kind: true, .. } => ", for one kind or all",
+            Self { is_per_collider: true, .. } => ", for one collider or all",
+            _ => "",
+        };
+        format!("{values}{off}{part}")
     }
 }
 
@@ -42,6 +46,9 @@ impl Action {
     /// rejected for having none.
     pub fn missing_condition(&self) -> Option<&'static str> {
         let is_bending = |parameter: &Text| parameter.as_str() == Parameter::Bending.name();
+        let is_per_collider = |parameter: &Text| {
+            Parameter::from_name(parameter.as_str()).is_some_and(|one| one.info().is_per_collider)
+        };
         match self {
             Self::Set { parameter, block: Some(_), .. } if is_bending(parameter) => Some(
                 "the block has no bends; a generated cloth, rope or mesh has them with the key bending",
@@ -50,6 +57,9 @@ impl Action {
                 "the scene has no bends; a scene has them with the key bending of a generated cloth, rope or \
                  mesh, or with [[bend]]",
             ),
+            Self::Set { parameter, .. } if is_per_collider(parameter) => {
+                Some("the scene has no collider; a scene has them with [[collider]]")
+            }
             Self::Set { .. } => {
                 Some("method \"xpbd\" has compliance, method \"pbd\" has stiffness")
             }
@@ -74,7 +84,7 @@ impl Action {
 
     fn allowed_ranges(&self) -> Option<String> {
         let values = match self {
-            Self::Set { parameter, constraint_kind, block, .. } => {
+            Self::Set { parameter, constraint_kind, block, collider, .. } => {
                 let info = Parameter::from_name(parameter.as_str())?.info();
                 let has_kind = constraint_kind.is_some() && !info.is_per_kind;
                 let kind = if has_kind { ", no kind" } else { "" };
@@ -85,8 +95,11 @@ impl Action {
                     Some(_) => ", no block",
                     None => "",
                 };
+                let has_collider = collider.is_some() && !info.is_per_collider;
+                let collider = if has_collider { ", no collider" } else { "" };
                 let values = info.allowed_values();
-                return Some(format!("{values}{}{kind}{block}", work(info.parameter)));
+                let work = work(info.parameter);
+                return Some(format!("{values}{work}{kind}{block}{collider}"));
             }
             Self::Grab { .. } | Self::Move { .. } => {
                 "coordinates within 1e7, z 0 in 2-D, over 0 to 0.25 s"
@@ -152,6 +165,7 @@ mod tests {
             value: ParameterValue::Number(1.0),
             constraint_kind: Some(KindFilter::Known(ConstraintKind::Bend)),
             block: None,
+            collider: None,
         };
         let values = action.allowed_values(Reason::OutOfRange).unwrap();
         assert_eq!(values, "a number >= 0, or off for 0, no kind");
@@ -161,12 +175,34 @@ mod tests {
     fn a_wrong_block_is_named() {
         let values = |name: &str| {
             let (parameter, value) = (Text::cut(name), ParameterValue::Number(1.0));
-            let action = Action::Set { parameter, value, constraint_kind: None, block: Some(9) };
+            let action = Action::Set {
+                parameter,
+                value,
+                constraint_kind: None,
+                block: Some(9),
+                collider: None,
+            };
             action.allowed_values(Reason::OutOfRange).unwrap()
         };
         assert_eq!(values("damping"), "a number >= 0, or off for 0, no block");
         let blocks = "a number >= 0, for a generated block of the scene, counted from 0";
         assert_eq!(values("bending"), blocks);
+    }
+
+    #[test]
+    fn a_wrong_collider_is_named() {
+        let set = |name: &str| Action::Set {
+            parameter: Text::cut(name),
+            value: ParameterValue::Number(2.0),
+            constraint_kind: None,
+            block: None,
+            collider: Some(9),
+        };
+        let values = |name: &str| set(name).allowed_values(Reason::OutOfRange).unwrap();
+        assert_eq!(values("damping"), "a number >= 0, or off for 0, no collider");
+        assert_eq!(values("restitution"), "0 to 1, or off for 0, for one collider or all");
+        let condition = set("friction").missing_condition().unwrap();
+        assert_eq!(condition, "the scene has no collider; a scene has them with [[collider]]");
     }
 
     #[test]

@@ -29,7 +29,7 @@ impl ActionFields {
         Self::new("cut_segment", &["from", "to", "direction"], &[]),
         Self::new("move_anchor", &["anchor", "translation"], &["rotation"]),
         Self::new("move_collider", &["collider", "translation"], &["rotation"]),
-        Self::new("set", &["parameter", "value"], &["constraint_kind", "block"]),
+        Self::new("set", &["parameter", "value"], &["constraint_kind", "block", "collider"]),
         Self::new("load", &["scene"], &[]),
         Self::new("rewind", &[], &["to_step", "back_steps"]),
         Self::new("restore", &["contents", "state_hash"], &[]),

@@ -60,15 +60,16 @@ pub(super) fn actions(
         Command::Mark { text } => {
             Action::Mark { text: Text::new(&text).map_err(|_| Reason::OutOfRange)? }
         }
-        Command::Set { parameter, value, constraint_kind, block, stroke: _ } => {
+        Command::Set { parameter, value, constraint_kind, block, collider, stroke: _ } => {
             let parameter = Text::new(&parameter).map_err(|_| Reason::UnknownParameter)?;
-            Action::Set { parameter, value, constraint_kind, block }
+            Action::Set { parameter, value, constraint_kind, block, collider }
         }
         Command::Rate { value } => Action::Set {
             parameter: Text::cut(Parameter::TimeScale.name()),
             value: ParameterValue::Number(value),
             constraint_kind: None,
             block: None,
+            collider: None,
         },
         Command::Seek { .. } | Command::Loop { .. } | Command::Ghost { .. } => {
             return Err(Refusal::OnlyReplay);

@@ -366,8 +366,13 @@ impl Link {
     /// if the node is paused, so they do not wait for a state.
     fn publish_parameters(&mut self, sinks: &Sinks) {
         let Some(state) = self.newest.get() else { return };
-        let initial = Some(state.load.summary.parameters.clone());
-        let text = ParametersText { is_complete: true, values: self.parameters.clone(), initial };
+        let summary = &state.load.summary;
+        let text = ParametersText {
+            is_complete: true,
+            values: self.parameters.clone(),
+            initial: Some(summary.parameters.clone()),
+            initial_colliders: summary.surfaces.clone(),
+        };
         if self.published_parameters.as_ref() != Some(&text) {
             sinks.publish(&Update::Parameters(&text));
             self.published_parameters = Some(text);

@@ -307,6 +307,7 @@ impl<'a> Player<'a> {
             is_complete,
             values: Some(ParameterValues { time_scale: self.playhead.rate, ..values }),
             initial: Some(initial),
+            initial_colliders: self.recording.load.summary.surfaces.clone(),
         };
         if self.parameters.as_ref() != Some(&text) {
             self.sinks.publish(&Update::Parameters(&text));

@@ -13,7 +13,7 @@
  *   method: string | null, rate_hz: number, is_paused: boolean, is_replay: boolean, time_scale: number, process_id: number | null,
  * }} NodeState
  * @typedef {Record<string, ParameterValue | Record<string, ParameterValue>>} Values
- * @typedef {{ type: "parameters", is_complete: boolean, values: Values | null, initial: Values | null }} Parameters
+ * @typedef {{ type: "parameters", is_complete: boolean, values: Values | null, initial: Values | null, initial_colliders?: { friction: number, restitution: number }[] }} Parameters
  * @typedef {{ type: "outcome", id: number | null, kind: string, status: "applied" | "rejected" | "unanswered", step: number | null, applied: number, rejected: number, reason: string, text: string, state_step?: number }} OutcomeMessage
  * @typedef {{ kind: "tear" | "pin" | "command" | "late" | "ghost", step: number, count: number, commands?: string[] }} Mark
  * @typedef {{

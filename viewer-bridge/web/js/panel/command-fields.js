@@ -30,7 +30,7 @@ export const COMMANDS = {
   move_collider: [COLLIDER, ...POSE],
   move_anchor: [{ name: "anchor", form: "index", example: "0" }, ...POSE],
   drive_body: [COLLIDER, ...POSE, ...["velocity", "angular_velocity", "force", "torque"].map((name) => (/** @type {Field} */ ({ name, form: "vector", example: "0 0 0", isOptional: true })))],
-  set: [{ name: "parameter", form: "text", example: "damping" }, { name: "value", form: "value", example: "0.5" }, { name: "constraint_kind", form: "text", example: "structural", isOptional: true }, { name: "block", form: "index", example: "0", isOptional: true }],
+  set: [{ name: "parameter", form: "text", example: "damping" }, { name: "value", form: "value", example: "0.5" }, { name: "constraint_kind", form: "text", example: "structural", isOptional: true }, { name: "block", form: "index", example: "0", isOptional: true }, { ...COLLIDER, isOptional: true }],
   step: [{ name: "count", form: "count", example: "1" }],
   rewind: [{ name: "to_step", form: "step", example: "0" }],
   load: [{ name: "scene", form: "text", example: "curtain" }],

@@ -3,18 +3,21 @@
 
 import { KINDS } from "../state/quantity.js";
 import { find, make } from "../ui/dom.js";
-import { SLIDER_STEPS, editable, hasBends, partsOf, positionOf, rangeOf, restoring, rowsOf, unitOf, valueAt, vectorOf } from "./parameters.js";
+import { SLIDER_STEPS, editable, hasBends, partsOf, positionOf, rangeOf, restoring, rowsOf, unitOf, valueAt, vectorOf, withSurfaces } from "./parameters.js";
 import { valueOf } from "../net/messages.js";
 import { unitIn } from "../ui/units.js";
 import { newStroke } from "../tools/tool.js";
 import { ValueField } from "./value-field.js";
 
 /** @typedef {import("./parameters.js").Row} Row */
+/** @typedef {import("../net/messages.js").Values} Values */
 /** @typedef {import("../net/messages.js").ParameterValue} ParameterValue */
 
 /** The bends of no scene. @type {import("./parameters.js").Bends} */
 const NO_BENDS = { shapes: [], hasExplicitBends: false };
 const AXES = ["x", "y", "z"];
+/** The parameters of colliders. */
+const OF_COLLIDERS = ["friction", "restitution"];
 /** Wind drag set along with a wind velocity if there is none, as wind has no effect without drag: the default of scenes, in kg/m³. */
 const WIND_DRAG = 0.6;
 /** Changes that follow each other within this time are undone together, in ms: the motion of a slider, or a reset of several rows. */
@@ -37,19 +40,36 @@ export class Panel {
     /** @type {(() => void)[]} */
     this.refreshers = [];
     this.built = "";
+    this.surfaces = "";
     form.addEventListener("submit", (event) => event.preventDefault());
     this.resetButton.addEventListener("click", () => this.reset());
     for (const topic of /** @type {const} */ (["hello", "node", "parameters", "scene", "connection"])) simulation.on(topic, () => this.update());
+    simulation.on("colliders", () => this.followColliders());
   }
 
   rows() {
-    return rowsOf(this.simulation.node?.method ?? null, hasBends(this.simulation.scene ?? NO_BENDS));
+    return rowsOf(this.simulation.node?.method ?? null, hasBends(this.simulation.scene ?? NO_BENDS), this.simulation.colliders.length > 0);
+  }
+
+  /** Shows another friction or restitution. Colliders arrive in each frame in which one of them moves. */
+  followColliders() {
+    const surfaces = this.simulation.colliders.map(({ friction, restitution }) => `${friction} ${restitution}`).join();
+    if (surfaces === this.surfaces) return;
+    this.surfaces = surfaces;
+    this.update();
+  }
+
+  /** The parameters now or in the scene, with those of its colliders. @param {"values" | "initial"} which @returns {Values | null} */
+  all(which) {
+    const { parameters, colliders } = this.simulation;
+    if (parameters === null || which === "values") return withSurfaces(parameters?.values ?? null, colliders);
+    return withSurfaces(parameters.initial, (parameters.initial_colliders ?? []).map((one, index) => ({ index, ...one })));
   }
 
   /** Rebuilds the rows for another scene or method; otherwise refreshes their values. */
   update() {
     const { simulation } = this;
-    const key = `${simulation.scene?.epoch} ${simulation.node?.method}`;
+    const key = `${simulation.scene?.epoch} ${simulation.node?.method} ${simulation.colliders.length}`;
     if (key !== this.built) {
       this.built = key;
       this.refreshers = [];
@@ -70,7 +90,7 @@ export class Panel {
 
   /** The parameters that differ from the values of the scene. */
   difference() {
-    const { values, initial } = this.simulation.parameters ?? { values: null, initial: null };
+    const [values, initial] = [this.all("values"), this.all("initial")];
     return values === null || initial === null ? { changes: [], lost: [] } : restoring(this.rows(), values, initial, KINDS);
   }
 
@@ -104,9 +124,10 @@ export class Panel {
     this.unsent.clear();
   }
 
-  /** @param {string} name @param {ParameterValue} value @param {string} [part] a kind of constraint, or a block */
+  /** @param {string} name @param {ParameterValue} value @param {string} [part] a kind of constraint, a collider or a block */
   set(name, value, part = "all") {
-    const field = KINDS.includes(part) ? { constraint_kind: part } : part === "all" ? {} : { block: Number(part) };
+    const index = OF_COLLIDERS.includes(name) ? "collider" : "block";
+    const field = KINDS.includes(part) ? { constraint_kind: part } : part === "all" ? {} : { [index]: Number(part) };
     const now = performance.now();
     if (now - this.changedMs > STROKE_MS) this.stroke = newStroke();
     this.changedMs = now;
@@ -179,12 +200,12 @@ export class Panel {
   numberRow(row) {
     const { simulation } = this;
     const slider = make("input", { type: "range", min: 0, max: SLIDER_STEPS, id: `set-${row.name}` });
-    const parts = partsOf(row, simulation.scene ?? NO_BENDS, KINDS);
+    const parts = partsOf(row, simulation.scene ?? NO_BENDS, KINDS, simulation.colliders);
     const options = [{ part: "all", text: "all" }, ...parts].map(({ part, text }) => make("option", { value: part }, text));
-    const choice = make("select", { "aria-label": `${row.label}: ${row.parts === "blocks" ? "shape" : "constraint kind"}` }, ...options);
+    const choice = make("select", { "aria-label": `${row.label}: ${row.parts === "kinds" ? "constraint kind" : row.parts === "blocks" ? "shape" : "collider"}` }, ...options);
     const isOn = make("input", { type: "checkbox", "aria-label": `${row.label}: on` });
     const part = () => (parts.length > 0 ? choice.value : "all");
-    const read = (/** @type {"values" | "initial"} */ which) => valueOf(simulation.parameters?.[which] ?? null, row.name, part() === "all" ? "structural" : part());
+    const read = (/** @type {"values" | "initial"} */ which) => valueOf(this.all(which), row.name, part() === "all" && row.parts !== "colliders" ? "structural" : part());
     const numbers = () => [read("values"), read("initial")].filter((value) => typeof value === "number");
     const range = () => rangeOf(row, .../** @type {number[]} */ (numbers()));
     const send = (/** @type {ParameterValue} */ value) => this.set(row.name, value, part());

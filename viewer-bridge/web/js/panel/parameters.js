@@ -9,10 +9,10 @@ import { blockValues, toNumber, valueOf } from "../net/messages.js";
 /**
  * A row of the panel. A "log" slider is logarithmic, and starts with 0 if `hasZero`. `whenOn` is the value
  * of a parameter when it is switched on. A row with `parts` has a value for all constraints or bends, or for those of a part: a
- * kind of constraint, or a generated block with bends. Without a value, each has its own.
+ * kind of constraint, a generated block with bends, or a collider. Without a value, each has its own.
  * @typedef {{
  *   name: string, label: string, unit: string, kind: "vector" | "linear" | "log" | "whole",
- *   least: number, most: number, canBeOff?: boolean, hasZero?: boolean, whenOn?: number, method?: "xpbd" | "pbd", parts?: "kinds" | "blocks",
+ *   least: number, most: number, canBeOff?: boolean, hasZero?: boolean, whenOn?: number, method?: "xpbd" | "pbd", parts?: "kinds" | "blocks" | "colliders",
  * }} Row
  */
 
@@ -35,24 +35,38 @@ export const ROWS = [
   { name: "tear_distance", label: "Tear distance", unit: "m", kind: "log", least: 1e-3, most: 100, canBeOff: true, whenOn: 0.1 },
   { name: "contact", label: "Contact distance", unit: "m", kind: "log", least: 1e-3, most: 1, canBeOff: true, whenOn: 0.02 },
   { name: "contact_friction", label: "Contact friction", unit: "", kind: "linear", least: 0, most: 2 },
+  { name: "friction", label: "Collider friction", unit: "", kind: "linear", least: 0, most: 2, parts: "colliders" },
+  { name: "restitution", label: "Collider bounce", unit: "", kind: "linear", least: 0, most: 1, parts: "colliders" },
   { name: "time_scale", label: "Speed", unit: "×", kind: "log", least: 0.01, most: 10 },
 ];
 
 /** The bends of a scene, as its shapes tell. @typedef {{ shapes: { shape: string, has_bends?: boolean }[], hasExplicitBends: boolean }} Bends */
+/** A collider with its surface. @typedef {{ index: number, shape?: string, friction: number, restitution: number }} Surface */
 
-/** The rows for a method; that of bends only if the scene has some. @param {string | null} method @param {boolean} hasBends */
-export const rowsOf = (method, hasBends) =>
-  ROWS.filter((row) => (row.method === undefined || row.method === (method ?? "xpbd")) && (hasBends || row.parts !== "blocks"));
+/** The rows for a method; those of bends and colliders only if the scene has some. @param {string | null} method @param {boolean} hasBends @param {boolean} [hasColliders] */
+export const rowsOf = (method, hasBends, hasColliders = false) =>
+  ROWS.filter((row) => (row.method === undefined || row.method === (method ?? "xpbd")) && (hasBends || row.parts !== "blocks") && (hasColliders || row.parts !== "colliders"));
+
+/** Adds the friction and restitution of colliders to parameters, by index, and under "all" if they are equal.
+ * @param {Values | null} values @param {Surface[]} colliders @returns {Values | null} */
+export function withSurfaces(values, colliders) {
+  const byPart = (/** @type {"friction" | "restitution"} */ name) => {
+    const all = colliders.length > 0 && colliders.every((one) => one[name] === colliders[0][name]) ? colliders[0][name] : null;
+    return { all, ...Object.fromEntries(colliders.map((one) => [one.index, one[name]])) };
+  };
+  return values === null ? null : { ...values, friction: byPart("friction"), restitution: byPart("restitution") };
+}
 
 /** True if a scene has bends. @param {Bends} scene */
 export const hasBends = ({ shapes, hasExplicitBends }) => hasExplicitBends || shapes.some((shape) => shape.has_bends);
 
 /**
  * The parts of a row, with the texts that name them: none if a value for all says the same.
- * @param {Row} row @param {Bends} scene @param {string[]} kinds of constraints @returns {{ part: string, text: string }[]}
+ * @param {Row} row @param {Bends} scene @param {string[]} kinds of constraints @param {Surface[]} [colliders] @returns {{ part: string, text: string }[]}
  */
-export function partsOf(row, { shapes, hasExplicitBends }, kinds) {
+export function partsOf(row, { shapes, hasExplicitBends }, kinds, colliders = []) {
   if (row.parts === "kinds") return kinds.map((part) => ({ part, text: part }));
+  if (row.parts === "colliders") return colliders.length > 1 ? colliders.map(({ index, shape }) => ({ part: String(index), text: `${index} ${shape}` })) : [];
   if (row.parts === undefined) return [];
   const blocks = shapes.flatMap((shape, block) => (shape.has_bends ? [{ part: String(block), text: `${block} ${shape.shape}` }] : []));
   return blocks.length > 1 || hasExplicitBends ? blocks : [];
@@ -130,7 +144,8 @@ export function restoring(rows, values, initial, kinds) {
   const lost = [];
   for (const row of rows) {
     const blocks = row.parts === "blocks" ? blockValues(values).map((one) => String(one.block)) : [];
-    for (const part of row.parts === "kinds" ? kinds : [undefined, ...blocks]) {
+    const colliders = row.parts === "colliders" ? Object.keys(values[row.name] ?? {}).filter((part) => part !== "all") : [];
+    for (const part of row.parts === "kinds" ? kinds : row.parts === "colliders" ? colliders : [undefined, ...blocks]) {
       const [now, first] = [values, initial].map((one) => valueOf(one, row.name, part ?? ""));
       if (String(now) === String(first)) continue;
       if (first === null && row.parts !== undefined) lost.push(row.label);

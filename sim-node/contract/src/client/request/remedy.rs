@@ -101,7 +101,8 @@ mod tests {
     #[test]
     fn a_rejection_names_the_allowed_values_or_the_missing_condition() {
         let (parameter, value) = (Text::cut("tear_force"), ParameterValue::Number(-1.0));
-        let set = Action::Set { parameter, value, constraint_kind: None, block: None };
+        let set =
+            Action::Set { parameter, value, constraint_kind: None, block: None, collider: None };
         let allowed = "allowed: a number > 0, or off for no limit";
         assert_eq!(remedy(set, Reason::OutOfRange, 0).as_deref(), Some(allowed));
         let frozen = "the particle is frozen; a reset restores it";

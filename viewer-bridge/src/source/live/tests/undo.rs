@@ -190,6 +190,7 @@ fn the_motion_of_a_slider_is_undone_as_a_whole_but_never_the_pace() {
         value: ParameterValue::Number(value),
         constraint_kind: None,
         block: None,
+        collider: None,
         stroke: Some(stroke),
     };
     fixture.change(Command::Reset {}, 100);
