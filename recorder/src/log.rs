@@ -52,4 +52,5 @@ pub use state_hash::state_hash;
 pub use tape::{Tape, TapeError, TapeState};
 pub use tears::{TearTracker, torn_before_first};
 pub use topic::{AllCounts, Topic, TopicCounts};
+pub(crate) use writer::replace_run_id;
 pub use writer::{Compression, LogOptions, LogWriter, WriteError};

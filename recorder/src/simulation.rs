@@ -1,58 +1,32 @@
 //! Steps a scene with commands in this process and writes the recording of a live run.
 
-pub(crate) mod apply;
+mod apply;
 pub(crate) mod frozen;
 mod job;
 mod kept_states;
+mod result;
 pub(crate) mod run_id;
 pub(crate) mod solver_rows;
 mod state_writer;
+mod stepped_recording;
 
 use std::io::Write;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use crate::log::{LogWriter, OutcomeRow, TimedCommand, WriteError};
-use sim_contract::{Action, Command, Outcome, Reason};
-use sim_solver::{Applied, Solver};
+use crate::log::{LogWriter, TimedCommand, WriteError};
+use sim_contract::{Action, Reason};
+use sim_solver::Solver;
 
-use apply::apply;
+pub use apply::apply;
 pub use frozen::{FrozenParticles, FrozenTracker};
 pub use job::{Job, Start};
 use kept_states::KeptStates;
 pub use kept_states::State;
-pub use solver_rows::{colliders_row, forces_row};
-use state_writer::{KeyframeDue, StateWriter};
-
-/// The result of a simulation.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SimulationResult {
-    /// Index of the first outcome.
-    first_index: u64,
-    /// The last computed step.
-    pub steps: u64,
-    /// Hash of the last state.
-    pub state_hash: u64,
-    /// Number of applied commands.
-    pub applied_count: u64,
-    /// Number of rejected commands.
-    pub rejected_count: u64,
-    /// The first rejected commands, at most 5.
-    pub rejections: Vec<Outcome>,
-    /// The steps that left contacts out, because particles were piled up too densely.
-    pub incomplete_contacts: Option<StepCount>,
-}
-
-/// Some steps.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct StepCount {
-    /// The first one.
-    pub first_step: u64,
-    /// Their number.
-    pub count: u64,
-}
-
-/// Most rejected commands to report one by one.
-const REJECTIONS_SHOWN_MAX: usize = 5;
+pub use result::{SimulationResult, StepCount};
+pub use solver_rows::{colliders_row, forces_row, step_row};
+use state_writer::StateWriter;
+pub use state_writer::{begin_log, finish_log};
+pub use stepped_recording::{SteppedRecording, SteppedRecordingError};
 
 /// The states of a simulation that it does not compute.
 #[derive(Debug)]
@@ -81,24 +55,24 @@ impl States<GiveState> {
 pub fn simulate<W: Write, E: From<WriteError>>(
     job: &Job,
     states: States<impl FnMut(&TimedCommand) -> Result<Option<State>, E>>,
-    log: Option<&mut LogWriter<W>>,
+    mut log: Option<&mut LogWriter<W>>,
     stop: &AtomicBool,
     mut on_step: impl FnMut(u64),
 ) -> Result<SimulationResult, E> {
     let States { mut solver, mut given } = states;
-    let run = job.description(&solver);
     let Start { step: first_step, .. } = job.start;
-    let mut writer = log.map(|log| StateWriter::new(log, run, job, &solver)).transpose()?;
+    let run = job.description(&solver);
+    let begin = |log: &mut &mut LogWriter<W>| {
+        let mut writer = StateWriter::new(log, &run, &job.scene, job.start, &solver)?;
+        writer.write_state(log, &solver, first_step)?;
+        Ok::<_, WriteError>(writer)
+    };
+    let mut writer = log.as_mut().map(begin).transpose()?;
     let mut result = SimulationResult::at_start(job.start, &solver);
-    if let Some(writer) = &mut writer {
-        writer.write_state(&solver, first_step, KeyframeDue::Now)?;
-    }
     let mut pending = job.commands.as_slice();
     let mut kept = KeptStates::for_commands(pending);
     kept.add(first_step, &solver);
     for step in first_step + 1..=job.steps {
-        let mut keyframe = KeyframeDue::OnTheSecond;
-        let mut rows = Vec::new();
         while let Some((command, rest)) = pending.split_first().filter(|(c, _)| c.step <= step) {
             let kept_state = match command.action {
                 Action::Rewind { to_step: Some(to_step), back_steps: None } => kept.take(to_step),
@@ -117,11 +91,10 @@ pub fn simulate<W: Write, E: From<WriteError>>(
                 }
                 (action, _) => apply(&mut solver, command.client_id, &action),
             };
-            if answer.is_ok_and(|applied| applied != Applied::Target) {
-                keyframe = KeyframeDue::Now;
-            }
             let outcome = result.count(command, step, answer.map(|_| ()));
-            rows.push(OutcomeRow::from(&outcome));
+            if let Some(writer) = &mut writer {
+                writer.add_outcome(&outcome, answer);
+            }
             pending = rest;
             if puts_state_in_place(&command.action) && answer.is_ok() {
                 // This step shows the state without further changes, as in a node.
@@ -137,9 +110,8 @@ pub fn simulate<W: Write, E: From<WriteError>>(
         }
         result.steps = step;
         kept.add(step, &solver);
-        if let Some(writer) = &mut writer {
-            writer.outcomes = rows;
-            writer.write_state(&solver, step, keyframe)?;
+        if let (Some(writer), Some(log)) = (&mut writer, &mut log) {
+            writer.write_state(log, &solver, step)?;
         }
         on_step(step);
         if stop.load(Ordering::Relaxed) {
@@ -152,38 +124,4 @@ pub fn simulate<W: Write, E: From<WriteError>>(
 
 fn puts_state_in_place(action: &Action) -> bool {
     matches!(action, Action::Rewind { .. } | Action::Restore { .. })
-}
-
-impl SimulationResult {
-    fn at_start(start: Start, solver: &Solver) -> Self {
-        Self {
-            first_index: start.outcome_count,
-            steps: start.step,
-            state_hash: solver.state_hash(),
-            applied_count: 0,
-            rejected_count: 0,
-            rejections: Vec::new(),
-            incomplete_contacts: None,
-        }
-    }
-
-    fn count_incomplete_contacts(&mut self, step: u64) {
-        let steps =
-            self.incomplete_contacts.get_or_insert(StepCount { first_step: step, count: 0 });
-        steps.count += 1;
-    }
-
-    /// Counts a command at the boundary before `step`, and returns its outcome.
-    fn count(&mut self, command: &TimedCommand, step: u64, result: Result<(), Reason>) -> Outcome {
-        let TimedCommand { client_id, sequence, action, .. } = *command;
-        let index = self.first_index + self.applied_count + self.rejected_count;
-        let outcome = Outcome::new(index, step, Command::new(client_id, sequence, action), result);
-        self.applied_count += u64::from(outcome.is_applied());
-        if !outcome.is_applied() {
-            self.rejected_count += 1;
-            let is_shown = self.rejections.len() < REJECTIONS_SHOWN_MAX;
-            self.rejections.extend(is_shown.then_some(outcome));
-        }
-        outcome
-    }
 }

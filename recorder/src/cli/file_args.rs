@@ -5,9 +5,7 @@ use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
 use anyhow::bail;
-use recorder::{
-    Compression, ContentSelection, Existing, LogOptions, LogWriter, PartFile, RunDescription,
-};
+use recorder::{Compression, Existing, LogOptions, LogWriter, PartFile};
 use sim_contract::part_path;
 
 /// The option to replace existing files.
@@ -88,20 +86,6 @@ impl FileArgs {
         Ok(PartFile::create(path, self.overwrite.existing())?)
     }
 
-    /// Starts the recording of a simulation in the file.
-    pub(crate) fn begin(
-        &self,
-        file: PartFile,
-        selection: ContentSelection,
-        run: &RunDescription,
-        scene: &[u8],
-    ) -> anyhow::Result<LogFile> {
-        let options = LogOptions { selection, ..self.options() };
-        Ok(LogWriter::create(file, options, run, scene, 0)?)
-    }
-}
-
-impl FileArgs {
     /// Returns the format of the file.
     pub(crate) fn options(&self) -> LogOptions {
         let compression = match self.compression {

@@ -8,10 +8,11 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::error::ErrorKind;
-use recorder::simulation::{Job, SimulationResult, Start, State, States, StepCount, simulate};
+use recorder::simulation::{
+    Job, SimulationResult, Start, State, States, StepCount, begin_log, finish_log, simulate,
+};
 use recorder::{
-    Closing, ContentSelection, LogEnd, LogReader, OutcomeRow, PartFile, SceneColliders,
-    TimedCommand, WriteError,
+    ContentSelection, LogEnd, LogOptions, LogReader, OutcomeRow, PartFile, TimedCommand, WriteError,
 };
 use serde::Serialize;
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
@@ -293,19 +294,14 @@ fn begin(args: &SimulateArgs, path: &Path, job: &Job, solver: &Solver) -> anyhow
     let file = args.file.create(path)?;
     let selection = ContentSelection::default();
     let selection = if args.forces { selection.with_forces() } else { selection };
-    let scene = job.scene.to_toml();
-    let log = args.file.begin(file, selection, &job.description(solver), scene.as_bytes());
-    let mut log = log.with_context(|| truncation(args))?;
-    log.describe_colliders(&SceneColliders::new(&job.scene)).with_context(|| truncation(args))?;
-    Ok(log)
+    let options = LogOptions { selection, ..args.file.options() };
+    let log = begin_log(file, options, &job.description(solver), &job.scene);
+    log.with_context(|| truncation(args))
 }
 
 fn finish(log: LogFile, result: &SimulationResult, steps: u64) -> anyhow::Result<PathBuf> {
     let stop_reason = if result.steps < steps { "interrupted" } else { "steps reached" };
-    let (stop_reason, counts) = (stop_reason.to_owned(), *log.counts());
-    let mut closing = Closing { stop_reason, counts, ..Closing::default() };
-    closing.counts.set_received_to_written();
-    Ok(log.finish(&closing)?.finish()?)
+    Ok(finish_log(log, stop_reason)?.finish()?)
 }
 
 /// Reports the first rejected commands. The recording has all of them.

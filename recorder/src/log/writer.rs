@@ -1,5 +1,6 @@
 //! Writes a recording: append-only, in complete chunks, and nothing after the first error.
 
+mod run_id;
 mod sink;
 
 use std::borrow::Cow;
@@ -20,6 +21,7 @@ use super::run::{
     header_library,
 };
 use super::topic::{AllCounts, Topic};
+pub(crate) use run_id::replace_run_id;
 use sink::{ChunkSink, SinkHandle};
 
 /// Bytes of an attachment to copy at a time.

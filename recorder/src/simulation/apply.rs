@@ -9,11 +9,7 @@ use sim_solver::{Applied, Control, Solver};
 ///
 /// # Errors
 /// The action is rejected and changes nothing.
-pub(crate) fn apply(
-    solver: &mut Solver,
-    client_id: u64,
-    action: &Action,
-) -> Result<Applied, Reason> {
+pub fn apply(solver: &mut Solver, client_id: u64, action: &Action) -> Result<Applied, Reason> {
     match solver.apply(client_id, action)? {
         Applied::Control(Control::Load { .. } | Control::Rewind { .. } | Control::Restore) => {
             Err(Reason::NoEffectHere)

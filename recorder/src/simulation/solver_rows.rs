@@ -1,8 +1,27 @@
-//! Rows of `/colliders`, `/tears` and `/forces`, from the state of a solver.
+//! Rows of `/steps`, `/colliders`, `/tears` and `/forces`, from the state of a solver.
 
-use crate::log::{AnchorForceRow, ColliderForceRow, CollidersRow, ForcesRow, TearsRow};
+use crate::log::{AnchorForceRow, ColliderForceRow, CollidersRow, ForcesRow, StepRow, TearsRow};
 use sim_contract::{ColliderState, PlainF32};
 use sim_solver::{PlacedCollider, Solver};
+
+use super::job::count;
+
+/// Returns the row of `step`, of a recording of every step, without the number of outcomes.
+pub fn step_row(solver: &Solver, step: u64) -> StepRow {
+    StepRow {
+        step,
+        scene_step: solver.scene_step(),
+        state_hash: solver.state_hash(),
+        torn_count: count(solver.torn().len()),
+        snapshot_index: Some(low_32_bits(step)),
+        ..StepRow::default()
+    }
+}
+
+#[allow(clippy::cast_possible_truncation, reason = "the low half is wanted")]
+fn low_32_bits(step: u64) -> u32 {
+    step as u32
+}
 
 /// Returns the colliders after `step`.
 pub fn colliders_row(solver: &Solver, step: u64) -> CollidersRow {

@@ -3,31 +3,51 @@
 use std::io::Write;
 
 use crate::log::{
-    CollidersRow, LogWriter, Message, OutcomeRow, ParametersRow, RunDescription, StepRow,
-    SurfaceRow, TopologyRow, WriteError, bend_state, constraint_state,
+    Closing, CollidersRow, LogOptions, LogWriter, Message, OutcomeRow, ParametersRow,
+    RunDescription, SceneColliders, StepRow, SurfaceRow, TopologyRow, WriteError, bend_state,
+    constraint_state,
 };
-use sim_contract::{LoadHeader, ParameterValues, ParticleState, Triangle};
-use sim_solver::Solver;
+use sim_contract::{LoadHeader, Outcome, ParameterValues, ParticleState, Reason, Triangle};
+use sim_solver::{Applied, Scene, Solver};
 
 use super::frozen::{FrozenParticles, FrozenTracker};
-use super::job::{Job, count};
-use super::solver_rows::{colliders_row, forces_row, new_tears_row};
+use super::job::Start;
+use super::solver_rows::{colliders_row, forces_row, new_tears_row, step_row};
 
-/// The time of the next keyframe.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum KeyframeDue {
-    /// In this step.
-    Now,
-    /// In this step, if it is a whole simulated second.
-    OnTheSecond,
+/// Starts the recording of a simulation.
+///
+/// # Errors
+/// If it cannot be written.
+pub fn begin_log<W: Write>(
+    out: W,
+    options: LogOptions,
+    run: &RunDescription,
+    scene: &Scene,
+) -> Result<LogWriter<W>, WriteError> {
+    let mut log = LogWriter::create(out, options, run, scene.to_toml().as_bytes(), 0)?;
+    log.describe_colliders(&SceneColliders::new(scene))?;
+    Ok(log)
 }
 
-/// Writes a simulation step by step.
-pub(super) struct StateWriter<'a, W: Write> {
-    log: &'a mut LogWriter<W>,
+/// Completes the recording of a simulation.
+///
+/// # Errors
+/// If it cannot be written.
+pub fn finish_log<W: Write>(log: LogWriter<W>, stop_reason: &str) -> Result<W, WriteError> {
+    let (stop_reason, counts) = (stop_reason.to_owned(), *log.counts());
+    let mut closing = Closing { stop_reason, counts, ..Closing::default() };
+    closing.counts.set_received_to_written();
+    log.finish(&closing)
+}
+
+/// Writes a simulation step by step. Every call gets the same log.
+#[derive(Debug)]
+pub(super) struct StateWriter {
     run: RunDescription,
     /// The outcomes of the next step.
-    pub(super) outcomes: Vec<OutcomeRow>,
+    outcomes: Vec<OutcomeRow>,
+    /// The next step has a keyframe, also if it is no whole simulated second.
+    is_keyframe_due: bool,
     outcome_count: u64,
     first_step: u64,
     /// The last written row.
@@ -37,17 +57,18 @@ pub(super) struct StateWriter<'a, W: Write> {
     frozen: FrozenTracker,
 }
 
-impl<'a, W: Write> StateWriter<'a, W> {
+impl StateWriter {
     /// Starts with the load. `solver` has the first state.
-    pub(super) fn new(
-        log: &'a mut LogWriter<W>,
-        run: RunDescription,
-        job: &Job,
+    pub(super) fn new<W: Write>(
+        log: &mut LogWriter<W>,
+        run: &RunDescription,
+        scene: &Scene,
+        start: Start,
         solver: &Solver,
     ) -> Result<Self, WriteError> {
         let header = LoadHeader { method: run.method, ..LoadHeader::default() };
         // A command may have changed the constraints of the state.
-        let loaded = Solver::new(&job.scene);
+        let loaded = Solver::new(scene);
         let constraints: Vec<_> = loaded.constraints().map(constraint_state).collect();
         let triangles: Vec<_> =
             solver.triangles().iter().map(|corners| Triangle { corners: *corners }).collect();
@@ -57,11 +78,11 @@ impl<'a, W: Write> StateWriter<'a, W> {
         log.write(&Message::Topology(topology), 0)?;
         log.write(&Message::Surface(SurfaceRow::new(&header, &triangles)), 0)?;
         Ok(Self {
-            log,
-            run,
+            run: run.clone(),
             outcomes: Vec::new(),
-            outcome_count: job.start.outcome_count,
-            first_step: job.start.step,
+            is_keyframe_due: true,
+            outcome_count: start.outcome_count,
+            first_step: start.step,
             // A scene without colliders has no row.
             colliders: CollidersRow { step: 0, colliders: Vec::new() },
             parameters: None,
@@ -69,45 +90,56 @@ impl<'a, W: Write> StateWriter<'a, W> {
         })
     }
 
+    /// Adds the outcome of a command at the boundary before the next step.
+    pub(super) fn add_outcome(&mut self, outcome: &Outcome, result: Result<Applied, Reason>) {
+        self.is_keyframe_due |= result.is_ok_and(|applied| applied != Applied::Target);
+        self.outcomes.push(OutcomeRow::from(outcome));
+    }
+
     /// Writes all messages of a step. The snapshot is the last one.
-    pub(super) fn write_state(
+    pub(super) fn write_state<W: Write>(
         &mut self,
+        log: &mut LogWriter<W>,
         solver: &Solver,
         step: u64,
-        keyframe: KeyframeDue,
     ) -> Result<(), WriteError> {
         let time_ns = self.run.time_of_step_ns(step);
         let is_second = step.is_multiple_of(u64::from(self.run.rate_hz));
         // By simulated time, not by wall-clock time, so that equal inputs give equal files.
         if is_second && step > 0 {
-            self.log.flush()?;
+            log.flush()?;
         }
-        self.write_colliders(solver, step)?;
+        self.write_colliders(log, solver, step)?;
         let is_in_place = self.outcomes.iter().any(|row| row.replaces_state() && row.is_applied());
         if let Some(row) = new_tears_row(solver, step, is_in_place) {
-            self.log.write(&Message::Tears(row), time_ns)?;
+            log.write(&Message::Tears(row), time_ns)?;
         }
-        self.write_parameters(solver, step)?;
+        self.write_parameters(log, solver, step)?;
         // No step has led to the first state.
         if step > self.first_step
             && let Some(row) = forces_row(solver, step)
         {
-            self.log.write(&Message::Forces(row), time_ns)?;
+            log.write(&Message::Forces(row), time_ns)?;
         }
-        if is_second || keyframe == KeyframeDue::Now {
+        if std::mem::take(&mut self.is_keyframe_due) || is_second {
             let bytes = solver.keyframe().encode();
-            self.log.write(&Message::Keyframe { step, bytes }, time_ns)?;
+            log.write(&Message::Keyframe { step, bytes }, time_ns)?;
         }
         for row in self.outcomes.drain(..) {
             self.outcome_count += 1;
-            self.log.write(&Message::Outcome(row), time_ns)?;
+            log.write(&Message::Outcome(row), time_ns)?;
         }
-        self.write_snapshot(solver, step)
+        self.write_snapshot(log, solver, step)
     }
 
     /// Writes the colliders in each step while one moves, and after each change. The step after a
     /// motion is a change too, because the velocity returns to 0.
-    fn write_colliders(&mut self, solver: &Solver, step: u64) -> Result<(), WriteError> {
+    fn write_colliders<W: Write>(
+        &mut self,
+        log: &mut LogWriter<W>,
+        solver: &Solver,
+        step: u64,
+    ) -> Result<(), WriteError> {
         if solver.collider_count() == 0 {
             return Ok(());
         }
@@ -116,49 +148,40 @@ impl<'a, W: Write> StateWriter<'a, W> {
             return Ok(());
         }
         self.colliders = row.clone();
-        self.log.write(&Message::Colliders(row), self.run.time_of_step_ns(step))
+        log.write(&Message::Colliders(row), self.run.time_of_step_ns(step))
     }
 
     /// Writes the parameters at the start and after each change.
-    fn write_parameters(&mut self, solver: &Solver, step: u64) -> Result<(), WriteError> {
+    fn write_parameters<W: Write>(
+        &mut self,
+        log: &mut LogWriter<W>,
+        solver: &Solver,
+        step: u64,
+    ) -> Result<(), WriteError> {
         let values = solver.parameter_values();
         if self.parameters.as_ref() == Some(&values) {
             return Ok(());
         }
         self.parameters = Some(values.clone());
         let row = ParametersRow { step, values };
-        self.log.write(&Message::Parameters(row), self.run.time_of_step_ns(step))
+        log.write(&Message::Parameters(row), self.run.time_of_step_ns(step))
     }
 
-    fn write_snapshot(&mut self, solver: &Solver, step: u64) -> Result<(), WriteError> {
+    fn write_snapshot<W: Write>(
+        &mut self,
+        log: &mut LogWriter<W>,
+        solver: &Solver,
+        step: u64,
+    ) -> Result<(), WriteError> {
         let time_ns = self.run.time_of_step_ns(step);
         let particles: &[ParticleState] = bytemuck::cast_slice(solver.particles());
         for row in self.frozen.new_events(step, FrozenParticles::find(particles)) {
-            self.log.write(&Message::Event(row), time_ns)?;
+            log.write(&Message::Event(row), time_ns)?;
         }
-        self.log.write(&Message::Step(self.row(solver, step)), time_ns)?;
-        let mut buffer = self.log.take_spare().unwrap_or_default();
+        let row = StepRow { outcome_count: self.outcome_count, ..step_row(solver, step) };
+        log.write(&Message::Step(row), time_ns)?;
+        let mut buffer = log.take_spare().unwrap_or_default();
         buffer.copy_from(particles);
-        self.log.write_particles(step, buffer, time_ns)
+        log.write_particles(step, buffer, time_ns)
     }
-
-    fn row(&self, solver: &Solver, step: u64) -> StepRow {
-        StepRow {
-            step,
-            scene_step: solver.scene_step(),
-            state_hash: solver.state_hash(),
-            topology_revision: 0,
-            torn_count: count(solver.torn().len()),
-            outcome_count: self.outcome_count,
-            wake_late_ns: 0,
-            solve_ns: 0,
-            // Every step is recorded.
-            snapshot_index: Some(low_32_bits(step)),
-        }
-    }
-}
-
-#[allow(clippy::cast_possible_truncation, reason = "the low half is wanted")]
-fn low_32_bits(step: u64) -> u32 {
-    step as u32
 }

@@ -11,7 +11,7 @@ use super::finding::{SnapshotFinding, StepGap};
 use super::past_states::PastStates;
 use super::side_rows::SideRows;
 use super::state::{compare, has_other_tears};
-use crate::simulation::apply::apply;
+use crate::simulation::apply;
 
 /// The reason why a recording cannot be re-simulated.
 #[derive(Debug, thiserror::Error)]
