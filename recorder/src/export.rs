@@ -3,6 +3,5 @@
 pub(crate) mod data;
 pub(crate) mod frame_names;
 pub(crate) mod pictures;
-pub(crate) mod scene_state;
 pub(crate) mod selection;
 pub(crate) mod snapshots;

@@ -53,10 +53,12 @@
 
 mod complete_state;
 mod log;
+pub mod pictures;
 #[cfg(test)]
 mod proof_tests;
 mod recorded_scene;
 mod scene_drawing;
+mod scene_state;
 pub mod simulation;
 mod state_place;
 pub mod verification;
@@ -65,6 +67,7 @@ pub use complete_state::{CompleteState, CompleteStateError, complete_state};
 pub use log::*;
 pub use recorded_scene::{RecordedSceneError, recorded_scene, scene_to_simulate};
 pub use scene_drawing::{DrawnMesh, SCENE_TOPIC, SceneDrawing};
+pub use scene_state::{SceneState, SceneStateError, visit_states};
 pub use sim_contract::{Existing, PartFile, PartFileError};
 pub use sim_solver::scene::Up;
 pub use state_place::{FindStateError, StatePlace, Wanted, find_state};

@@ -74,6 +74,27 @@ def check_npz(recording, path):
     same(arrays["inverse_masses"], recording.particles[:, :, 3])
     same(arrays["velocities"], recording.particles[:, :, 4:7])
     assert (arrays["flags"] == recording.flags).all()
+    outcomes, forces = recording.rows["/outcomes"], recording.rows["/forces"]
+    assert arrays["command_steps"].tolist() == [row["step"] for row in outcomes] == [20, 30, 40]
+    assert [json.loads(text) for text in arrays["commands"]] == outcomes
+    # The first state has no forces. A particle that is pinned later has none before.
+    assert [row["step"] for row in forces] == recording.steps[1:]
+    fixed = arrays["fixed_particles"].tolist()
+    assert fixed == sorted({particle for row in forces for particle in row["particles"]}) and 90 in fixed
+    expected = np.full((len(recording.steps), len(fixed), 3), np.nan, "f4")
+    for index, row in enumerate(forces, 1):
+        for particle, impulse in zip(row["particles"], row["impulses"], strict=True):
+            expected[index, fixed.index(particle)] = impulse
+    assert np.isnan(expected[1:]).any() and np.isfinite(expected[40:]).all()
+    assert np.array_equal(arrays["fixed_impulses"], expected, equal_nan=True)
+    for kind in ("collider", "anchor"):
+        for name in ("impulse", "angular_impulse"):
+            found = arrays[f"{kind}_{name}s"]
+            expected = [[one[name] for one in row[f"{kind}s"]] for row in forces]
+            assert found.shape[0] == len(recording.steps) and np.isnan(found[0]).all()
+            assert np.array_equal(found[1:], np.array(expected, "f4").reshape(found[1:].shape))
+    contacts = [[one["contacts"] for one in row["colliders"]] for row in forces]
+    assert arrays["collider_contacts"][1:].tolist() == contacts
     return len(arrays["steps"])
 
 
@@ -240,15 +261,25 @@ def check_ros2(recording, folder):
     with Reader(folder) as bag:
         types = {connection.topic: connection.msgtype for connection in bag.connections}
         latched = {c.topic: [qos.durability.name for qos in c.ext.offered_qos_profiles] for c in bag.connections}
-        assert types == {"/tf_static": "tf2_msgs/msg/TFMessage", "/particles": "sensor_msgs/msg/PointCloud2"}
-        assert latched == {"/tf_static": ["TRANSIENT_LOCAL"], "/particles": []}
-        assert bag.message_count == len(recording.steps) + 1
+        text = "std_msgs/msg/String"
+        particles = {"/tf_static": "tf2_msgs/msg/TFMessage", "/particles": "sensor_msgs/msg/PointCloud2"}
+        assert types == particles | {"/outcomes": text, "/forces": text}
+        assert latched == {"/tf_static": ["TRANSIENT_LOCAL"], "/particles": [], "/outcomes": [], "/forces": []}
+        rows = recording.rows["/outcomes"] + recording.rows["/forces"]
+        assert bag.message_count == len(recording.steps) + 1 + len(rows)
         assert bag.duration == (recording.steps[-1] - recording.steps[0]) * 10**9 // recording.rate_hz + 1
     (file,) = Path(folder).glob("*.mcap")
     with open(file, "rb") as stream:
         assert make_reader(stream).get_header().profile == "ros2"
-    first, *clouds = read_ros2_messages(str(file))
+    first, *messages = read_ros2_messages(str(file))
     assert first.channel.topic == "/tf_static"
+    clouds = [message for message in messages if message.channel.topic == "/particles"]
+    for topic in ("/outcomes", "/forces"):
+        texts = [message for message in messages if message.channel.topic == topic]
+        found = [json.loads(message.ros_msg.data) for message in texts]
+        assert found == recording.rows[topic]
+        times = [message.log_time_ns for message in texts]
+        assert times == [row["step"] * 10**9 // recording.rate_hz for row in found]
     (transform,) = first.ros_msg.transforms
     assert (transform.header.frame_id, transform.child_frame_id) == ("map", "world")
     rotation = transform.transform.rotation

@@ -259,14 +259,21 @@ fn a_foreign_process_that_floods_ready_and_restore_changes_nothing() {
     assert_eq!(node.interrupt().code, Some(0));
 }
 
-/// Records a curtain that is cut, exports it in a format, and requires that the reader of another project
+/// Records a curtain that is cut, with its forces, exports it in a format, and requires that the reader of another project
 /// finds `snapshot_count` snapshots with the recorded bits.
 fn assert_export_is_read(format: &str, target: &str, snapshot_count: u64) {
     let sandbox = Sandbox::new();
     let (file, target) = (sandbox.path("run.mcap"), sandbox.path(target));
-    let cut = r#"{"step":20,"kind":"cut_radius","center":[0,1,0],"radius":0.15}"#;
-    let commands = sandbox.write("cut.jsonl", cut);
-    let args = ["simulate", "curtain", "--steps", "60", "--commands", &commands, "-o", &file];
+    let lines = concat!(
+        r#"{"step":20,"kind":"cut_radius","center":[0,1,0],"radius":0.15}"#,
+        "\n",
+        r#"{"step":30,"kind":"pin","particle":90}"#,
+        "\n",
+        r#"{"step":40,"kind":"mark","text":"gepinnt – ✓"}"#
+    );
+    let commands = sandbox.write("cut.jsonl", lines);
+    let args =
+        ["simulate", "curtain", "--steps", "60", "--commands", &commands, "--forces", "-o", &file];
     Process::run(Program::Recorder, &sandbox, &args).success();
     let option = format!("--{format}");
     Process::run(Program::Recorder, &sandbox, &["export", &file, &option, &target]).success();

@@ -14,7 +14,11 @@ use std::time::Duration;
 
 use anyhow::Context;
 use clap::error::ErrorKind;
-use recorder::{ContentSelection, LogEnd, LogReader, ReadError, open_regular_file};
+use recorder::pictures::{Bend, PictureOptions, Size, Style, View};
+use recorder::{
+    ContentSelection, LogEnd, LogReader, ReadError, SceneState, SceneStateError, open_regular_file,
+    visit_states,
+};
 use sim_contract::Stop;
 
 use crate::cli::damaged_input::lacks;
@@ -24,15 +28,11 @@ use crate::cli::output::{self, AsJson};
 use crate::cli::parse::{self, whole_number_in};
 use crate::cli::progress::{progress_bar, progress_bytes};
 use crate::export::frame_names::FrameNames;
-use crate::export::pictures::camera::View;
-use crate::export::pictures::mesh::Bend;
-use crate::export::pictures::shape::Size;
 use crate::export::pictures::target::Target;
-use crate::export::scene_state::{SceneState, visit_states};
 use crate::export::selection::{Choice, Moment, Selection, SnapshotRange};
 use data::DataFormat;
 use format_args::{Format, FormatArgs};
-use pictures::{Pace, Style};
+use pictures::Pace;
 use survey::Survey;
 
 /// Number of pictures without an option that selects them.
@@ -50,9 +50,10 @@ const FRAMES_PER_S_DEFAULT: u16 = 25;
 #[derive(Debug, clap::Args)]
 #[command(
     group = clap::ArgGroup::new("selection"),
-    after_help = "Pictures show colliders, surface triangles, constraints (structural dark, shear \
+    after_help = "Pictures of the style wires show colliders, surface triangles, constraints (structural dark, shear \
     lighter, bend dashed, tether dotted; torn ones are left out) and particles (pinned: red squares; \
-    grabbed orange, anchored green, frozen magenta). All pictures of a call have the same scale. \
+    grabbed orange, anchored green, frozen magenta), and of the style shaded smooth surfaces without them. All \
+    pictures of a call have the same scale. \
     Without an option that selects snapshots there are 8 of them; other formats have every \
     snapshot.\n\n\
     Coordinates are those of the recording, in m, relative to the origin of the scene: no format \
@@ -62,7 +63,7 @@ const FRAMES_PER_S_DEFAULT: u16 = 25;
     recorder export run.mcap --png pictures\n  \
     recorder export run.mcap --png pictures --every 100ms --view front --size 1280x720\n  \
     recorder export run.mcap --svg pictures --at 1s --at 1500ms --overwrite\n  \
-    recorder export run.mcap --apng run.png --to 5s --size 480x360\n  \
+    recorder export run.mcap --apng run.png --to 5s --size 480x360 --style shaded\n  \
     recorder export run.mcap --npz run.npz --from 2s --to 5s"
 )]
 pub(crate) struct ExportArgs {
@@ -96,6 +97,9 @@ pub(crate) struct ExportArgs {
     /// scene, else iso]
     #[arg(long, value_enum)]
     view: Option<View>,
+    /// Appearance of pictures [default: wires]
+    #[arg(long, value_enum)]
+    style: Option<StyleArg>,
     /// Leave bend constraints out of pictures
     #[arg(long)]
     no_bend: bool,
@@ -103,6 +107,15 @@ pub(crate) struct ExportArgs {
     overwrite: OverwriteArgs,
     #[command(flatten)]
     as_json: AsJson,
+}
+
+/// Appearance of pictures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum StyleArg {
+    /// Particles, constraints and triangles
+    Wires,
+    /// Smooth surfaces; only where there is none, structural constraints and loose particles
+    Shaded,
 }
 
 /// Returns the options of the formats in parentheses, for the error of an unknown option.
@@ -171,7 +184,7 @@ fn export<R: Read>(
         let bar = progress_bar(steps.len() as u64);
         // Only errors of reading get the name of the recording.
         let mut refused = None;
-        let visited = visit_states(open()?, steps, |state| {
+        let visited: Result<(), SceneStateError> = visit_states(open()?, steps, |state| {
             bar.inc(1);
             visitor(state).or_else(|error| {
                 refused = Some(error);
@@ -191,12 +204,13 @@ fn export<R: Read>(
     match *format {
         Format::Pictures(format, folder) => {
             let target = Target::new(folder, format, existing, &survey.run.scene_name);
-            let written = pictures::draw(&snapshots, args.style(), &target)?;
+            let written = pictures::draw(&snapshots, args.picture_options(), &target)?;
             let files: Vec<_> = written.iter().map(|picture| picture.file.as_str()).collect();
             output::result(args.as_json, &written, &files.join("\n"))
         }
         Format::Animation(path) => {
-            let written = pictures::animate(&snapshots, args.style(), args.pace(), path, existing)?;
+            let written =
+                pictures::animate(&snapshots, args.picture_options(), args.pace(), path, existing)?;
             output::result(args.as_json, &written, &written.to_string())
         }
         Format::Data(format, target) => {
@@ -220,9 +234,12 @@ impl ExportArgs {
         Selection { range: SnapshotRange { from: self.from, to: self.to }, choice }
     }
 
-    fn style(&self) -> Style {
-        let bend = if self.no_bend { Bend::Hide } else { Bend::Draw };
-        Style { size: self.size.unwrap_or(SIZE_DEFAULT), view: self.view, bend }
+    fn picture_options(&self) -> PictureOptions {
+        let style = match self.style {
+            Some(StyleArg::Shaded) => Style::Shaded,
+            _ => Style::Wires(if self.no_bend { Bend::Hide } else { Bend::Draw }),
+        };
+        PictureOptions { size: self.size.unwrap_or(SIZE_DEFAULT), view: self.view, style }
     }
 
     /// Returns the wall-clock time of a frame.
@@ -248,7 +265,9 @@ impl ExportArgs {
             ("--fps", self.fps.is_some() && !matches!(format, Format::Animation(_)), "--apng"),
             ("--size", self.size.is_some() && !is_picture, of_pictures),
             ("--view", self.view.is_some() && !is_picture, of_pictures),
+            ("--style", self.style.is_some() && !is_picture, of_pictures),
             ("--no-bend", self.no_bend && !is_picture, of_pictures),
+            ("--no-bend", self.no_bend && self.style == Some(StyleArg::Shaded), "--style wires"),
         ];
         match ignored.into_iter().find(|(_, is_ignored, _)| *is_ignored) {
             None => Ok(()),

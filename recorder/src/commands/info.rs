@@ -11,12 +11,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
+use recorder::pictures::encode_svg;
 use recorder::{LogEnd, LogReader, Message, PartFile};
 
 use crate::cli::exit::Exit;
 use crate::cli::file_args::OverwriteArgs;
 use crate::cli::output::{self, AsJson};
-use crate::export::pictures::svg;
 use columns::{ColumnCollector, Columns};
 use graph::{COLUMNS_MAX, Graph};
 use report::Info;
@@ -101,7 +101,7 @@ fn graph(args: &InfoArgs, info: &Info, timing: &Timing) -> anyhow::Result<String
         wake_late: &wake_late,
         solve: &solve,
     };
-    Ok(svg::encode(&graph.draw()))
+    Ok(encode_svg(&graph.draw()))
 }
 
 /// Returns the columns of the wake-up lateness and of the solver time.

@@ -4,10 +4,8 @@ use std::io::Read;
 use std::ops::ControlFlow;
 
 use anyhow::bail;
-use recorder::RunDescription;
+use recorder::{OutcomeRow, RunDescription, SceneState};
 use sim_solver::scene::Up;
-
-use super::scene_state::SceneState;
 
 /// Visits the states of the selected snapshots in their order, until the visitor breaks.
 pub(crate) type VisitStates<'a> = dyn Fn(&mut dyn FnMut(&SceneState) -> anyhow::Result<ControlFlow<()>>) -> anyhow::Result<()>
@@ -43,6 +41,15 @@ impl Snapshots<'_> {
     /// Returns the simulated time since the first snapshot of the recording.
     pub(crate) fn time_s(&self, step: u64) -> f64 {
         step.saturating_sub(self.first_step) as f64 / f64::from(self.run.rate_hz)
+    }
+
+    /// Returns the outcomes of commands that a state adds, of the steps from the first selected snapshot on.
+    pub(crate) fn outcomes<'s>(&self, state: &'s SceneState) -> &'s [OutcomeRow] {
+        let first_step = self.steps.first().copied().unwrap_or_default();
+        // They are in the order of their steps.
+        let start = state.outcomes.partition_point(|row| row.step < first_step);
+        let end = state.outcomes.partition_point(|row| row.step <= state.row.step);
+        &state.outcomes[start.min(end)..end]
     }
 
     /// Reads the selected snapshots from first to last.

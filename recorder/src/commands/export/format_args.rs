@@ -21,7 +21,8 @@ pub(super) struct FormatArgs {
     /// Draw an animated PNG file, in real time [default: a frame for each 1/FPS of simulated time]
     #[arg(long, value_name = "FILE")]
     apng: Option<PathBuf>,
-    /// Write arrays for NumPy: steps, times, positions, velocities, inverse masses and flags
+    /// Write arrays for NumPy: steps, times, positions, velocities, inverse masses and flags; commands as JSON with
+    /// their steps; and recorded forces, as impulses in N s
     #[arg(long, value_name = "FILE")]
     npz: Option<PathBuf>,
     /// Write a table with a row for each particle of each snapshot
@@ -46,8 +47,8 @@ pub(super) struct FormatArgs {
     /// colliders, 30 times per second of simulated time, or with --every
     #[arg(long, value_name = "FILE.mcap", conflicts_with_all = ["from", "to", "frames", "at"])]
     foxglove: Option<PathBuf>,
-    /// Write a bag of ROS 2 into this folder: `PointCloud2` on `/particles`, and on `/tf_static` the turn of
-    /// the scene's up axis to z
+    /// Write a bag of ROS 2 into this folder: `PointCloud2` on `/particles`, commands and recorded forces as JSON on
+    /// `/outcomes` and `/forces`, and on `/tf_static` the turn of the scene's up axis to z
     #[arg(long, value_name = "DIR")]
     ros2: Option<PathBuf>,
 }

@@ -4,27 +4,15 @@ use std::path::Path;
 use std::time::Duration;
 
 use recorder::Existing;
+use recorder::pictures::{ExtentTracker, PictureOptions, Renderer, View};
 use serde::Serialize;
 
 use super::data::Written;
 use crate::cli::output;
 use crate::export::data::written_files::WrittenFiles;
 use crate::export::pictures::apng::Animation;
-use crate::export::pictures::camera::{Basis, Camera, View};
-use crate::export::pictures::extent::ExtentTracker;
-use crate::export::pictures::mesh::Bend;
-use crate::export::pictures::renderer::Renderer;
-use crate::export::pictures::shape::Size;
 use crate::export::pictures::target::Target;
 use crate::export::snapshots::Snapshots;
-
-/// The options that control the appearance of the pictures.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Style {
-    pub(super) size: Size,
-    pub(super) view: Option<View>,
-    pub(super) bend: Bend,
-}
 
 /// The times of the frames of an animation.
 #[derive(Debug, Clone, Copy)]
@@ -59,11 +47,11 @@ pub(super) struct WrittenPicture {
 /// Draws the snapshots. A picture gets its name when it is complete, and stays if a later one fails.
 pub(super) fn draw(
     snapshots: &Snapshots<'_>,
-    style: Style,
+    options: PictureOptions,
     target: &Target<'_>,
 ) -> anyhow::Result<Vec<WrittenPicture>> {
     target.prepare(snapshots.steps)?;
-    let renderer = renderer(snapshots, style)?;
+    let renderer = renderer(snapshots, options)?;
     let mut written = Vec::new();
     snapshots.for_each(|state| {
         let step = state.row.step;
@@ -78,7 +66,7 @@ pub(super) fn draw(
 /// Draws the snapshots as the frames of one animated PNG file.
 pub(super) fn animate(
     snapshots: &Snapshots<'_>,
-    style: Style,
+    options: PictureOptions,
     pace: Pace,
     path: &Path,
     existing: Existing,
@@ -86,8 +74,8 @@ pub(super) fn animate(
     let mut files = WrittenFiles::new(existing);
     files.add_streamed(path, |out| {
         let times_s: Vec<_> = snapshots.steps.iter().map(|step| snapshots.time_s(*step)).collect();
-        let mut animation = Animation::begin(out, style.size, &pace.delays(&times_s))?;
-        let renderer = renderer(snapshots, style)?;
+        let mut animation = Animation::begin(out, options.size, &pace.delays(&times_s))?;
+        let renderer = renderer(snapshots, options)?;
         snapshots.for_each(|state| {
             animation.add(&renderer.draw(state, snapshots.time_s(state.row.step)))
         })?;
@@ -97,21 +85,17 @@ pub(super) fn animate(
 }
 
 /// Reads the selected states once, so that one camera shows all of them.
-pub(super) fn renderer(snapshots: &Snapshots<'_>, style: Style) -> anyhow::Result<Renderer> {
+pub(super) fn renderer(
+    snapshots: &Snapshots<'_>,
+    options: PictureOptions,
+) -> anyhow::Result<Renderer> {
     let mut tracker = ExtentTracker::default();
     snapshots.for_each(|state| {
         tracker.add(state);
         Ok(())
     })?;
-    let extent = tracker.extent();
-    let up = snapshots.up;
-    let default_view = || if snapshots.is_2d { View::Front } else { View::best_for(&extent, up) };
-    let view = style.view.unwrap_or_else(default_view);
-    Ok(Renderer {
-        camera: Camera::fit(Basis::new(view, up), &extent, style.size),
-        extent,
-        size: style.size,
-        bend: style.bend,
-        scene_name: snapshots.run.scene_name.clone(),
-    })
+    let view = options.view.or(snapshots.is_2d.then_some(View::Front));
+    let options = PictureOptions { view, ..options };
+    let name = snapshots.run.scene_name.clone();
+    Ok(Renderer::new(options, tracker.extent(), snapshots.up, name))
 }

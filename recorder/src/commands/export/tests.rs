@@ -9,18 +9,15 @@ use std::io::Cursor;
 use std::sync::atomic::AtomicBool;
 
 use clap::Parser;
+use recorder::pictures::{
+    Basis, Camera, ExtentTracker, Picture, Renderer, Shape, encode_png, encode_svg,
+};
 use recorder::simulation::{Job, States, simulate};
 use recorder::{Closing, Existing, LogOptions, LogWriter, Message, RunDescription, StepRow, Up};
 use sim_contract::{ConstraintState, ParticleFlags, ParticleState, Triangle};
 use sim_solver::{Scene, Solver};
 
 use super::*;
-use crate::export::pictures::camera::{Basis, Camera};
-use crate::export::pictures::extent::ExtentTracker;
-use crate::export::pictures::renderer::Renderer;
-use crate::export::pictures::shape::{Picture, Shape};
-use crate::export::pictures::{png, svg};
-use crate::export::scene_state::SceneState;
 use crate::export::snapshots::Snapshots;
 
 /// A square of cloth in front of a sphere and above a floor, with a pinned particle at its side.
@@ -86,8 +83,11 @@ fn record_with_text(scene: &str, steps: u64, text: &str) -> Vec<u8> {
     log.finish(&Closing::default()).unwrap()
 }
 
-const STYLE: Style =
-    Style { size: Size { width: 160, height: 120 }, view: Some(View::Front), bend: Bend::Draw };
+const OPTIONS: PictureOptions = PictureOptions {
+    size: Size { width: 160, height: 120 },
+    view: Some(View::Front),
+    style: Style::Wires(Bend::Draw),
+};
 
 /// Calls `work` with the snapshots of `steps` of a recording, or with all of them.
 fn with_snapshots<T>(
@@ -109,9 +109,9 @@ fn survey_of(file: &[u8], path: &str) -> Survey {
     Survey::read(LogReader::new(file).unwrap(), path, |_| {}).unwrap()
 }
 
-fn pictures(file: &[u8], steps: &[u64], style: Style) -> Vec<Picture> {
+fn pictures(file: &[u8], steps: &[u64], options: PictureOptions) -> Vec<Picture> {
     with_snapshots(file, Some(steps), |snapshots| {
-        let renderer = pictures::renderer(snapshots, style).unwrap();
+        let renderer = pictures::renderer(snapshots, options).unwrap();
         let mut pictures = Vec::new();
         snapshots
             .for_each(|state| {
@@ -125,18 +125,18 @@ fn pictures(file: &[u8], steps: &[u64], style: Style) -> Vec<Picture> {
 
 #[test]
 fn a_tiny_scene_is_drawn_from_back_to_front() {
-    let picture = &pictures(&record(TINY, 0), &[0], STYLE)[0];
-    insta::assert_snapshot!(svg::encode(picture));
+    let picture = &pictures(&record(TINY, 0), &[0], OPTIONS)[0];
+    insta::assert_snapshot!(encode_svg(picture));
 }
 
 #[test]
 fn the_same_recording_gives_the_same_bytes() {
     let file = record(TINY, 40);
     let draw = |view| {
-        let style = Style { view, ..STYLE };
-        let pictures = pictures(&file, &[0, 20, 40], style);
-        let pngs: Vec<_> = pictures.iter().map(|picture| png::encode(picture).unwrap()).collect();
-        (pictures.iter().map(svg::encode).collect::<Vec<_>>(), pngs)
+        let options = PictureOptions { view, ..OPTIONS };
+        let pictures = pictures(&file, &[0, 20, 40], options);
+        let pngs: Vec<_> = pictures.iter().map(|picture| encode_png(picture).unwrap()).collect();
+        (pictures.iter().map(encode_svg).collect::<Vec<_>>(), pngs)
     };
     let (svgs, pngs) = draw(None);
     assert_eq!(draw(None), (svgs.clone(), pngs.clone()));
@@ -145,7 +145,7 @@ fn the_same_recording_gives_the_same_bytes() {
 
 #[test]
 fn a_png_has_the_size_that_was_asked_for_and_several_colors() {
-    let bytes = png::encode(&pictures(&record(TINY, 0), &[0], STYLE)[0]).unwrap();
+    let bytes = encode_png(&pictures(&record(TINY, 0), &[0], OPTIONS)[0]).unwrap();
     let mut reader = ::png::Decoder::new(Cursor::new(bytes)).read_info().unwrap();
     let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
     let frame = reader.next_frame(&mut pixels).unwrap();
@@ -166,7 +166,7 @@ fn the_frames_of_an_animation_are_the_pictures() {
     let frame_time = Duration::from_millis(20);
     let pace = Pace { frame_time, period: Some(frame_time / 2) };
     let rate_hz = with_snapshots(&file, Some(&[0, 20, 23]), |snapshots| {
-        pictures::animate(snapshots, STYLE, pace, &path, Existing::Refuse).unwrap();
+        pictures::animate(snapshots, OPTIONS, pace, &path, Existing::Refuse).unwrap();
         f64::from(snapshots.run.rate_hz)
     });
     let bytes = fs::read(&path).unwrap();
@@ -178,12 +178,13 @@ fn the_frames_of_an_animation_are_the_pictures() {
         [20.0, 3.0].map(|steps| 2.0 * 1000.0 * steps / rate_hz).into_iter().chain([20.0]);
     let mut shown = vec![0; reader.output_buffer_size().unwrap()];
     let mut stored_sizes = Vec::new();
-    for (picture, expected_ms) in pictures(&file, &[0, 20, 23], STYLE).into_iter().zip(expected_ms)
+    for (picture, expected_ms) in
+        pictures(&file, &[0, 20, 23], OPTIONS).into_iter().zip(expected_ms)
     {
         let mut part = vec![0; reader.output_buffer_size().unwrap()];
         reader.next_frame(&mut part).unwrap();
         let delay = reader.info().frame_control().unwrap();
-        let (row_bytes, part_bytes) = (3 * STYLE.size.width as usize, 3 * delay.width as usize);
+        let (row_bytes, part_bytes) = (3 * OPTIONS.size.width as usize, 3 * delay.width as usize);
         stored_sizes.push(delay.width * delay.height);
         let first = delay.y_offset as usize * row_bytes + delay.x_offset as usize * 3;
         for (row, pixels) in part.chunks_exact(part_bytes).take(delay.height as usize).enumerate() {
@@ -191,7 +192,7 @@ fn the_frames_of_an_animation_are_the_pictures() {
         }
         let delay_ms = 1000.0 * f64::from(delay.delay_num) / f64::from(delay.delay_den);
         assert!((delay_ms - expected_ms).abs() <= 1.0, "{delay_ms} {expected_ms}");
-        let single = png::encode(&picture).unwrap();
+        let single = encode_png(&picture).unwrap();
         let mut single = ::png::Decoder::new(Cursor::new(single)).read_info().unwrap();
         let mut pixels = vec![0; single.output_buffer_size().unwrap()];
         single.next_frame(&mut pixels).unwrap();
@@ -223,12 +224,16 @@ fn square() -> SceneState {
 }
 
 fn draw(state: &SceneState) -> Picture {
+    draw_in(Style::Wires(Bend::Draw), state)
+}
+
+fn draw_in(style: Style, state: &SceneState) -> Picture {
     let mut tracker = ExtentTracker::default();
     tracker.add(state);
-    let (extent, size) = (tracker.extent(), STYLE.size);
+    let (extent, size) = (tracker.extent(), OPTIONS.size);
     let camera = Camera::fit(Basis::new(View::Front, Up::Y), &extent, size);
     let scene_name = "square".to_owned();
-    Renderer { camera, extent, size, bend: Bend::Draw, scene_name }.draw(state, 0.0)
+    Renderer { camera, extent, size, style, scene_name }.draw(state, 0.0)
 }
 
 /// Returns the numbers of polygons, lines and dots.
@@ -253,6 +258,35 @@ fn torn_constraints_and_triangles_with_a_torn_structural_edge_are_left_out() {
     assert_eq!(counts(&draw(&state)), [0, 2, 4]);
 }
 
+/// The square stands at an angle to the light, and a rope and a loose particle beside it.
+#[test]
+fn a_shaded_surface_has_neither_wires_nor_dots_and_a_rope_keeps_its_line() {
+    let mut state = square();
+    state.particles[0].flags = ParticleFlags::PINNED;
+    assert_eq!(counts(&draw_in(Style::Shaded, &state)), [2, 0, 0]);
+    for x in [2.0, 3.0, 4.0] {
+        state.particles.push(ParticleState { position: [x, 0.0, 0.0], ..ParticleState::default() });
+    }
+    state.constraints.push(ConstraintState { a: 3, b: 4, ..state.constraints[0] });
+    state.constraints.push(ConstraintState { a: 4, b: 5, ..state.constraints[0] });
+    state.is_torn.extend([false, false]);
+    assert_eq!(counts(&draw_in(Style::Shaded, &state)), [2, 2, 1]);
+    assert_eq!(counts(&draw(&state)), [3, 7, 6]);
+    // The two triangles are bent against each other, and share the brightness of their corners.
+    state.particles[3].position[2] = 1.0;
+    let fills = |picture: &Picture| {
+        let fill = |shape: &Shape| match shape {
+            Shape::Polygon { fill, .. } => Some(*fill),
+            _ => None,
+        };
+        picture.shapes.iter().filter_map(fill).take(2).collect::<Vec<_>>()
+    };
+    let [flat, smooth] = [Style::Wires(Bend::Draw), Style::Shaded]
+        .map(|style| fills(&draw_in(style, &state)))
+        .map(|fills| fills[0].0[0].abs_diff(fills[1].0[0]));
+    assert!(smooth < flat, "{smooth} {flat}");
+}
+
 #[test]
 fn pinned_particles_are_squares_and_non_finite_ones_are_left_out() {
     let mut state = square();
@@ -260,7 +294,7 @@ fn pinned_particles_are_squares_and_non_finite_ones_are_left_out() {
     assert_eq!(counts(&draw(&state)), [3, 5, 3]);
     state.particles[3].position = [f32::NAN, f32::INFINITY, 1e30];
     assert_eq!(counts(&draw(&state)), [2, 3, 2]);
-    assert!(png::encode(&draw(&state)).is_ok());
+    assert!(encode_png(&draw(&state)).is_ok());
 }
 
 #[test]
@@ -302,7 +336,7 @@ fn a_reset_restores_torn_constraints() {
     simulate(&job, States::first(solver), Some(&mut log), &AtomicBool::new(false), |_| {}).unwrap();
     let file = log.finish(&Closing::default()).unwrap();
     let lines: Vec<_> =
-        pictures(&file, &[9, 10, 19, 20], STYLE).iter().map(|one| counts(one)[1]).collect();
+        pictures(&file, &[9, 10, 19, 20], OPTIONS).iter().map(|one| counts(one)[1]).collect();
     assert_eq!(lines, [8, 7, 7, 8]);
 }
 
@@ -319,7 +353,7 @@ fn a_recording_without_a_scene_is_drawn() {
     let survey = survey_of(&file, "a.mcap");
     assert_eq!(survey.scene.unwrap_err(), "a.mcap: has no scene (attachment scene.toml)");
     assert_eq!(survey.steps, [3]);
-    assert_eq!(counts(&pictures(&file, &[3], STYLE)[0]), [0, 0, 4]);
+    assert_eq!(counts(&pictures(&file, &[3], OPTIONS)[0]), [0, 0, 4]);
 }
 
 #[test]
@@ -330,7 +364,7 @@ fn a_truncated_recording_is_drawn_as_far_as_it_goes() {
     assert!(matches!(survey.end, LogEnd::Truncated { .. }), "{}", survey.end);
     let last = *survey.steps.last().unwrap();
     assert!(last > 10 && last < 190, "{last}");
-    assert_eq!(pictures(cut, &[last], STYLE), pictures(&file, &[last], STYLE));
+    assert_eq!(pictures(cut, &[last], OPTIONS), pictures(&file, &[last], OPTIONS));
 }
 
 #[test]
@@ -435,9 +469,11 @@ fn options_select_the_snapshots_and_the_style() {
     let to = Moment::Time(Duration::from_secs(2));
     assert_eq!(range, SnapshotRange { from: Some(Moment::Step(480)), to: Some(to) });
     let args = parse("a.mcap --svg d --size 20x30 --no-bend --view top").unwrap();
-    let style = args.style();
-    assert_eq!((style.size, style.view), (Size { width: 20, height: 30 }, Some(View::Top)));
-    assert_eq!(style.bend, Bend::Hide);
+    let options = args.picture_options();
+    assert_eq!((options.size, options.view), (Size { width: 20, height: 30 }, Some(View::Top)));
+    assert_eq!(options.style, Style::Wires(Bend::Hide));
+    let shaded = parse("a.mcap --svg d --style shaded").unwrap();
+    assert_eq!(shaded.picture_options().style, Style::Shaded);
 }
 
 #[test]

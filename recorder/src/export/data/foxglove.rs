@@ -3,12 +3,12 @@
 use std::io::Write;
 
 use recorder::{
-    AllCounts, DrawnMesh, GapCounter, LogReader, SCENE_TOPIC, SceneDrawing, scene_format,
+    AllCounts, DrawnMesh, GapCounter, LogReader, SCENE_TOPIC, SceneDrawing, SceneState,
+    scene_format,
 };
 use sim_contract::{ConstraintKind, TornConstraint};
 
 use super::recording_copy::RecordingCopy;
-use crate::export::scene_state::SceneState;
 use crate::export::snapshots::Snapshots;
 
 const STRUCTURAL_KIND: u32 = ConstraintKind::Structural as u32;

@@ -2,9 +2,11 @@
 //!
 //! An array is written from its first number to its last, so each column reads the recording once.
 
+use std::collections::BTreeSet;
 use std::io::Write;
 
-use sim_contract::ParticleState;
+use recorder::{ForcesRow, OutcomeRow, SceneState};
+use sim_contract::{ParticleState, PlainF32};
 use zip::write::{SimpleFileOptions, StreamWriter};
 use zip::{DateTime, ZipWriter};
 
@@ -51,7 +53,114 @@ const COLUMNS: [Column; 4] = [
     },
 ];
 
-/// Writes the arrays `steps` and `times` (s), and those of the particles.
+/// A column of the forces, with a row for each collider, anchor or fixed particle.
+struct ForceColumn {
+    name: &'static str,
+    number_type: &'static str,
+    /// Numbers per row. One number has no axis of its own.
+    width: usize,
+    rows: fn(&Survey) -> usize,
+    append: fn(&Survey, &ForcesRow, &mut Vec<u8>),
+}
+
+const FORCE_COLUMNS: [ForceColumn; 6] = [
+    ForceColumn {
+        name: "collider_impulses",
+        number_type: "<f4",
+        width: 3,
+        rows: |survey| survey.collider_count,
+        append: |_, row, bytes| {
+            row.colliders.iter().for_each(|one| append_vector(bytes, one.impulse));
+        },
+    },
+    ForceColumn {
+        name: "collider_angular_impulses",
+        number_type: "<f4",
+        width: 3,
+        rows: |survey| survey.collider_count,
+        append: |_, row, bytes| {
+            row.colliders.iter().for_each(|one| append_vector(bytes, one.angular_impulse));
+        },
+    },
+    ForceColumn {
+        name: "collider_contacts",
+        number_type: "<u4",
+        width: 1,
+        rows: |survey| survey.collider_count,
+        append: |_, row, bytes| {
+            let contacts = row.colliders.iter().map(|one| one.contacts.to_le_bytes());
+            bytes.extend(contacts.flatten());
+        },
+    },
+    ForceColumn {
+        name: "anchor_impulses",
+        number_type: "<f4",
+        width: 3,
+        rows: |survey| survey.anchor_count,
+        append: |_, row, bytes| {
+            row.anchors.iter().for_each(|one| append_vector(bytes, one.impulse));
+        },
+    },
+    ForceColumn {
+        name: "anchor_angular_impulses",
+        number_type: "<f4",
+        width: 3,
+        rows: |survey| survey.anchor_count,
+        append: |_, row, bytes| {
+            row.anchors.iter().for_each(|one| append_vector(bytes, one.angular_impulse));
+        },
+    },
+    ForceColumn {
+        name: "fixed_impulses",
+        number_type: "<f4",
+        width: 3,
+        rows: |survey| survey.fixed.len(),
+        append: |survey, row, bytes| {
+            // Both lists ascend.
+            let mut fixed = row.particles.iter().zip(&row.impulses).peekable();
+            for particle in &survey.fixed {
+                let impulse = fixed.next_if(|(one, _)| *one == particle).map(|(_, one)| *one);
+                append_vector(bytes, impulse.unwrap_or([PlainF32(f32::NAN); 3]));
+            }
+        },
+    },
+];
+
+fn append_vector(bytes: &mut Vec<u8>, vector: [PlainF32; 3]) {
+    bytes.extend(vector.iter().flat_map(|number| number.0.to_le_bytes()));
+}
+
+/// The commands, and the numbers of rows of the forces.
+#[derive(Default)]
+struct Survey {
+    /// The outcomes of the steps from the first to the last snapshot.
+    commands: Vec<OutcomeRow>,
+    has_forces: bool,
+    collider_count: usize,
+    anchor_count: usize,
+    /// The particles that were fixed in any of the steps.
+    fixed: BTreeSet<u32>,
+}
+
+impl Survey {
+    fn read(snapshots: &Snapshots<'_>) -> anyhow::Result<Self> {
+        let mut survey = Self::default();
+        snapshots.for_each(|state| {
+            survey.commands.extend_from_slice(snapshots.outcomes(state));
+            if let Some(row) = &state.forces {
+                survey.has_forces = true;
+                survey.collider_count = row.colliders.len();
+                survey.anchor_count = row.anchors.len();
+                survey.fixed.extend(&row.particles);
+            }
+            Ok(())
+        })?;
+        Ok(survey)
+    }
+}
+
+/// Writes the arrays `steps` and `times` (s), those of the particles, the commands as JSON, and the forces if the
+/// recording has them.
 pub(crate) fn write(snapshots: &Snapshots<'_>, out: &mut dyn Write) -> anyhow::Result<()> {
     let mut archive = Archive(ZipWriter::new_stream(out));
     let steps = snapshots.steps.iter();
@@ -65,6 +174,16 @@ pub(crate) fn write(snapshots: &Snapshots<'_>, out: &mut dyn Write) -> anyhow::R
     }
     for column in COLUMNS {
         archive.add_column(snapshots, &column)?;
+    }
+    let survey = Survey::read(snapshots)?;
+    archive.add_commands(&survey.commands)?;
+    if survey.has_forces {
+        let fixed: Vec<_> = survey.fixed.iter().copied().collect();
+        archive.begin("fixed_particles", "<u4", &[fixed.len()])?;
+        archive.0.write_all(bytemuck::cast_slice(&fixed))?;
+        for column in FORCE_COLUMNS {
+            archive.add_forces(snapshots, &survey, &column)?;
+        }
     }
     archive.0.finish()?;
     Ok(())
@@ -93,6 +212,50 @@ impl Archive<'_> {
             bytes.clear();
             for particle in &state.particles {
                 (column.append)(particle, &mut bytes);
+            }
+            Ok(self.0.write_all(&bytes)?)
+        })
+    }
+}
+
+impl Archive<'_> {
+    /// Adds the commands as they are in `/outcomes`, and their steps.
+    fn add_commands(&mut self, commands: &[OutcomeRow]) -> anyhow::Result<()> {
+        self.begin("command_steps", "<u8", &[commands.len()])?;
+        for command in commands {
+            self.0.write_all(&command.step.to_le_bytes())?;
+        }
+        let texts = commands.iter().map(serde_json::to_string).collect::<Result<Vec<_>, _>>()?;
+        // Every text has the length of the longest one, in letters of 32 bits; NumPy removes zeros at the end.
+        let length = texts.iter().map(|text| text.chars().count()).max().unwrap_or(0).max(1);
+        self.begin("commands", &format!("<U{length}"), &[commands.len()])?;
+        for text in &texts {
+            let letters = text.chars().map(u32::from).chain(std::iter::repeat(0)).take(length);
+            let bytes: Vec<_> = letters.flat_map(u32::to_le_bytes).collect();
+            self.0.write_all(&bytes)?;
+        }
+        Ok(())
+    }
+
+    /// Adds a column of the forces. What a snapshot lacks is NaN, or 0 of a whole number.
+    fn add_forces(
+        &mut self,
+        snapshots: &Snapshots<'_>,
+        survey: &Survey,
+        column: &ForceColumn,
+    ) -> anyhow::Result<()> {
+        let rows = (column.rows)(survey);
+        let shape = [snapshots.steps.len(), rows, column.width];
+        let axis_count = if column.width == 1 { 2 } else { 3 };
+        self.begin(column.name, column.number_type, &shape[..axis_count])?;
+        let missing = if column.number_type == "<f4" { f32::NAN.to_le_bytes() } else { [0; 4] };
+        let mut bytes = Vec::new();
+        snapshots.for_each(|state: &SceneState| {
+            bytes.clear();
+            if let Some(row) = &state.forces {
+                (column.append)(survey, row, &mut bytes);
+            } else {
+                bytes.extend(missing.repeat(rows * column.width));
             }
             Ok(self.0.write_all(&bytes)?)
         })

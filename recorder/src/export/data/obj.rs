@@ -5,8 +5,8 @@ use std::path::Path;
 
 use super::written_files::WrittenFiles;
 use crate::export::frame_names::FrameNames;
-use crate::export::scene_state::SceneState;
 use crate::export::snapshots::Snapshots;
+use recorder::SceneState;
 
 /// Writes a file per snapshot into `folder`.
 pub(crate) fn write(

@@ -1,5 +1,5 @@
-//! A bag of ROS 2: an MCAP file with `PointCloud2` messages and the static transform that turns the scene's
-//! `up` to z, and the metadata that `ros2 bag` reads.
+//! A bag of ROS 2: an MCAP file with `PointCloud2` messages, commands and forces as JSON, and the static transform
+//! that turns the scene's `up` to z, and the metadata that `ros2 bag` reads.
 
 mod cdr;
 mod schemas;
@@ -18,10 +18,13 @@ use super::written_files::WrittenFiles;
 use crate::export::frame_names::FrameNames;
 use crate::export::snapshots::Snapshots;
 use cdr::CdrMessage;
-use schemas::{MessageType, POINT_CLOUD, TRANSFORMS};
+use schemas::{MessageType, POINT_CLOUD, STRING, TRANSFORMS};
 
 const PARTICLES_TOPIC: &str = "/particles";
 const TRANSFORM_TOPIC: &str = "/tf_static";
+/// The rows of the topics with these names in a recording.
+const OUTCOMES_TOPIC: &str = "/outcomes";
+const FORCES_TOPIC: &str = "/forces";
 const METADATA_NAME: &str = "metadata.yaml";
 const SECOND_NS: u64 = 1_000_000_000;
 /// Numbers of types in a `PointField`.
@@ -55,12 +58,23 @@ pub(crate) fn write(
     let (path, metadata_path) = (names.index_path("mcap"), folder.join(METADATA_NAME));
     files.existing().check(&metadata_path)?;
     names.prepare(&[], files.existing())?;
-    files.add_streamed(&path, |out| write_messages(snapshots, out))?;
+    let mut counts = RowCounts::default();
+    files.add_streamed(&path, |out| {
+        counts = write_messages(snapshots, out)?;
+        Ok(())
+    })?;
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    files.add_whole(&metadata_path, metadata(snapshots, &name).as_bytes())
+    files.add_whole(&metadata_path, metadata(snapshots, counts, &name).as_bytes())
 }
 
-fn write_messages(snapshots: &Snapshots<'_>, out: &mut dyn Write) -> anyhow::Result<()> {
+/// Numbers of messages with rows.
+#[derive(Clone, Copy, Default)]
+struct RowCounts {
+    outcomes: usize,
+    forces: usize,
+}
+
+fn write_messages(snapshots: &Snapshots<'_>, out: &mut dyn Write) -> anyhow::Result<RowCounts> {
     let mut file = WriteOptions::new()
         .profile("ros2")
         .library(concat!("catenary recorder ", env!("CARGO_PKG_VERSION")))
@@ -71,6 +85,9 @@ fn write_messages(snapshots: &Snapshots<'_>, out: &mut dyn Write) -> anyhow::Res
         .create(NoSeek::new(out))?;
     let transforms = add_channel(&mut file, TRANSFORM_TOPIC, &TRANSFORMS)?;
     let clouds = add_channel(&mut file, PARTICLES_TOPIC, &POINT_CLOUD)?;
+    let outcomes = add_channel(&mut file, OUTCOMES_TOPIC, &STRING)?;
+    let forces = add_channel(&mut file, FORCES_TOPIC, &STRING)?;
+    let mut counts = RowCounts::default();
     let header = |channel_id, step: u64| {
         let time_ns = snapshots.run.time_of_step_ns(step);
         // The low half of the step, as in recordings.
@@ -80,12 +97,29 @@ fn write_messages(snapshots: &Snapshots<'_>, out: &mut dyn Write) -> anyhow::Res
     let first = header(transforms, snapshots.steps[0]);
     file.write_to_known_channel(&first, &transform(snapshots, first.log_time))?;
     snapshots.for_each(|state| {
+        for row in snapshots.outcomes(state) {
+            let message = text_message(&serde_json::to_string(row)?);
+            file.write_to_known_channel(&header(outcomes, row.step), &message)?;
+            counts.outcomes += 1;
+        }
+        if let Some(row) = &state.forces {
+            let message = text_message(&serde_json::to_string(row)?);
+            file.write_to_known_channel(&header(forces, row.step), &message)?;
+            counts.forces += 1;
+        }
         let header = header(clouds, state.row.step);
         let message = point_cloud(&state.particles, header.log_time);
         Ok(file.write_to_known_channel(&header, &message)?)
     })?;
     file.finish()?;
-    Ok(())
+    Ok(counts)
+}
+
+/// Returns a `std_msgs/String`.
+fn text_message(text: &str) -> Vec<u8> {
+    let mut message = CdrMessage::new();
+    message.add_text(text);
+    message.finish()
 }
 
 fn add_channel<W: Write>(
@@ -145,11 +179,12 @@ fn transform(snapshots: &Snapshots<'_>, time_ns: u64) -> Vec<u8> {
 }
 
 /// Returns the metadata of the bag, version 5, which later versions of rosbag2 read.
-fn metadata(snapshots: &Snapshots<'_>, file_name: &str) -> String {
+fn metadata(snapshots: &Snapshots<'_>, rows: RowCounts, file_name: &str) -> String {
     let time_ns = |step: Option<&u64>| snapshots.run.time_of_step_ns(step.copied().unwrap_or(0));
     let start_ns = time_ns(snapshots.steps.first());
     let duration_ns = time_ns(snapshots.steps.last()).saturating_sub(start_ns);
-    let (cloud_count, count) = (snapshots.steps.len(), snapshots.steps.len() + 1);
+    let cloud_count = snapshots.steps.len();
+    let count = cloud_count + 1 + rows.outcomes + rows.forces;
     let topic = |name: &str, message: &MessageType, qos: &str, count: usize| {
         let type_name = message.name;
         format!(
@@ -159,7 +194,9 @@ fn metadata(snapshots: &Snapshots<'_>, file_name: &str) -> String {
         )
     };
     let topics = topic(TRANSFORM_TOPIC, &TRANSFORMS, TRANSFORM_QOS, 1)
-        + &topic(PARTICLES_TOPIC, &POINT_CLOUD, "", cloud_count);
+        + &topic(PARTICLES_TOPIC, &POINT_CLOUD, "", cloud_count)
+        + &topic(OUTCOMES_TOPIC, &STRING, "", rows.outcomes)
+        + &topic(FORCES_TOPIC, &STRING, "", rows.forces);
     format!(
         "rosbag2_bagfile_information:\n  version: 5\n  storage_identifier: mcap\n  duration:\n    \
          nanoseconds: {duration_ns}\n  starting_time:\n    nanoseconds_since_epoch: {start_ns}\n  \

@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
+use recorder::SceneState;
 use sim_contract::ParticleState;
 
 use super::polydata::{NumberType, PolyData, PolyDataCounts};
 use super::written_files::WrittenFiles;
 use crate::export::frame_names::FrameNames;
-use crate::export::scene_state::SceneState;
 use crate::export::snapshots::Snapshots;
 
 /// Writes the files into `folder`.

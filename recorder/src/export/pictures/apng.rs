@@ -4,9 +4,7 @@ use std::io::Write;
 use std::time::Duration;
 
 use anyhow::{Context, bail};
-
-use super::png::rasterize;
-use super::shape::{Picture, Size};
+use recorder::pictures::{Picture, Size, rasterize};
 
 /// Most frames of an animation. A higher number is probably a mistake.
 const FRAMES_MAX: usize = 10_000;
@@ -57,10 +55,7 @@ impl<'a> Animation<'a> {
     /// Adds a frame. Only the rectangle that changes is written, which makes most files several times
     /// smaller.
     pub(crate) fn add(&mut self, picture: &Picture) -> anyhow::Result<()> {
-        let pixmap = rasterize(picture)?;
-        let pixels = pixmap.pixels().iter();
-        let colors = pixels.flat_map(|pixel| [pixel.red(), pixel.green(), pixel.blue()]);
-        let rgb: Vec<u8> = colors.map(rounded).collect();
+        let rgb: Vec<u8> = rasterize(picture)?.into_iter().map(rounded).collect();
         let changed = self.changed(&rgb);
         let delay_ms = self.delays_ms.next().context("more frames than times")?;
         self.writer.set_frame_delay(delay_ms, MILLISECONDS_PER_S)?;

@@ -2,10 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
+use recorder::pictures::{Picture, encode_png, encode_svg};
 use recorder::{Existing, PartFile};
 
-use super::shape::Picture;
-use super::{png, svg};
 use crate::export::frame_names::FrameNames;
 
 /// The folder and the format of the pictures.
@@ -45,8 +44,8 @@ impl<'a> Target<'a> {
     /// Writes the picture of a step. The file gets its name only when it is complete.
     pub(crate) fn write(&self, step: u64, picture: &Picture) -> anyhow::Result<PathBuf> {
         let bytes = match self.format {
-            PictureFormat::Png => png::encode(picture)?,
-            PictureFormat::Svg => svg::encode(picture).into_bytes(),
+            PictureFormat::Png => encode_png(picture)?,
+            PictureFormat::Svg => encode_svg(picture).into_bytes(),
         };
         let path = self.names.path(step);
         PartFile::write_whole(&path, self.existing, &bytes)?;

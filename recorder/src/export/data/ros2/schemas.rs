@@ -43,6 +43,9 @@ uint32 count
 ",
 };
 
+pub(super) const STRING: MessageType =
+    MessageType { name: "std_msgs/msg/String", definition: "string data\n" };
+
 pub(super) const TRANSFORMS: MessageType = MessageType {
     name: "tf2_msgs/msg/TFMessage",
     definition: "\

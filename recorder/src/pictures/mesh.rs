@@ -9,7 +9,7 @@ use sim_contract::{ConstraintKind, ParticleFlags};
 use super::camera::Camera;
 use super::extent::position;
 use super::shape::{Color, Dash, Shape, Stroke};
-use crate::export::scene_state::SceneState;
+use crate::scene_state::SceneState;
 
 const SURFACE: Color = Color([0x8f, 0xb8, 0xde]);
 const STRUCTURAL: Color = Color([0x2b, 0x3a, 0x4a]);
@@ -49,13 +49,24 @@ struct LineWidth {
 pub(crate) struct MeshDrawing<'a> {
     pub(crate) state: &'a SceneState,
     pub(crate) camera: &'a Camera,
-    pub(crate) bend: Bend,
+    pub(crate) style: Style,
+}
+
+/// The drawn part of the particles, constraints and triangles.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Style {
+    /// All of them.
+    Wires(Bend),
+    /// Smooth surfaces. Of the rest only structural constraints and loose particles, where there is no surface.
+    Shaded,
 }
 
 /// The handling of bend constraints.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Bend {
+pub enum Bend {
+    /// Draws them.
     Draw,
+    /// Leaves them out.
     Hide,
 }
 
@@ -75,6 +86,10 @@ impl MeshDrawing<'_> {
     /// Returns all shapes, from back to front.
     pub(crate) fn shapes(&self) -> Vec<Shape> {
         let triangles = self.triangles();
+        let normals = match self.style {
+            Style::Wires(_) => Vec::new(),
+            Style::Shaded => self.normals(&triangles),
+        };
         let mut last_at = vec![None; self.state.particles.len()];
         for (place, triangle) in triangles.iter().enumerate() {
             for corner in self.state.triangles[*triangle].corners {
@@ -83,7 +98,7 @@ impl MeshDrawing<'_> {
         }
         let mut shapes: Vec<OrderedShape> = Vec::new();
         for (after, triangle) in triangles.iter().enumerate() {
-            shapes.push((DrawOrder { after, rank: 0 }, self.triangle(*triangle)));
+            shapes.push((DrawOrder { after, rank: 0 }, self.triangle(*triangle, &normals)));
         }
         self.add_lines(&mut shapes, &last_at);
         self.add_dots(&mut shapes, &last_at);
@@ -105,9 +120,27 @@ impl MeshDrawing<'_> {
         order.into_iter().map(|(_, index)| index).collect()
     }
 
-    fn triangle(&self, index: usize) -> Shape {
-        let [a, b, c] = self.state.triangles[index].corners.map(|corner| self.point(corner));
-        let normal = (b - a).cross(c - a).normalize_or_zero();
+    /// Returns the sums of the normals of the triangles at each particle, by their areas.
+    fn normals(&self, triangles: &[usize]) -> Vec<DVec3> {
+        let mut normals = vec![DVec3::ZERO; self.state.particles.len()];
+        for triangle in triangles {
+            let corners = self.state.triangles[*triangle].corners;
+            let [a, b, c] = corners.map(|corner| self.point(corner));
+            let normal = (b - a).cross(c - a);
+            corners.iter().for_each(|corner| normals[*corner as usize] += normal);
+        }
+        normals
+    }
+
+    /// Without normals of the particles, the triangle has its own.
+    fn triangle(&self, index: usize, normals: &[DVec3]) -> Shape {
+        let corners = self.state.triangles[index].corners;
+        let [a, b, c] = corners.map(|corner| self.point(corner));
+        let normal = match normals {
+            [] => (b - a).cross(c - a),
+            _ => corners.iter().map(|corner| normals[*corner as usize].normalize_or_zero()).sum(),
+        };
+        let normal = normal.normalize_or_zero();
         let fill = SURFACE.times(self.camera.brightness(normal));
         // The outline closes the seams between neighbors.
         let outline = Some(Stroke::solid(fill, 0.7));
@@ -117,11 +150,18 @@ impl MeshDrawing<'_> {
 
     fn add_lines(&self, shapes: &mut Vec<OrderedShape>, last_at: &[Option<usize>]) {
         for constraint in self.state.untorn_constraints() {
-            if constraint.kind == BEND_KIND && self.bend == Bend::Hide {
-                continue;
-            }
             let [a, b] = [constraint.a, constraint.b];
             let lasts = [a, b].map(|end| last_at[end as usize]);
+            let is_shown = match self.style {
+                Style::Wires(Bend::Draw) => true,
+                Style::Wires(Bend::Hide) => constraint.kind != BEND_KIND,
+                Style::Shaded => {
+                    constraint.kind == STRUCTURAL_KIND && lasts.iter().any(Option::is_none)
+                }
+            };
+            if !is_shown {
+                continue;
+            }
             // A bend constraint lies on structural lines and must not hide them.
             let is_bend = constraint.kind == BEND_KIND;
             let after = if is_bend { lasts[0].min(lasts[1]) } else { lasts[0].max(lasts[1]) };
@@ -144,12 +184,16 @@ impl MeshDrawing<'_> {
         let marked_radius = radius.max(MARKED_RADIUS_MIN * scale) * 1.4;
         for (index, state) in (0_u32..).zip(particles) {
             let place = index as usize;
-            let is_shown = particles.len() < DOTS_BELOW || !is_connected[place];
-            if state.flags & MARKED_FLAGS == 0 && !is_shown {
+            let is_marked = state.flags & MARKED_FLAGS != 0;
+            let is_shown = match self.style {
+                Style::Wires(_) => is_marked || particles.len() < DOTS_BELOW,
+                Style::Shaded => false,
+            };
+            if !(is_shown || !is_connected[place]) {
                 continue;
             }
             let after = last_at[place].unwrap_or(usize::MAX);
-            let radius = if state.flags & MARKED_FLAGS == 0 { radius } else { marked_radius };
+            let radius = if is_marked { marked_radius } else { radius };
             let order = DrawOrder { after, rank: DOT_RANK };
             shapes.push((order, dot(state.flags, self.pixel(index), radius)));
         }
@@ -179,6 +223,7 @@ impl MeshDrawing<'_> {
     }
 }
 
+const STRUCTURAL_KIND: u32 = ConstraintKind::Structural as u32;
 const BEND_KIND: u32 = ConstraintKind::Bend as u32;
 const SHEAR_KIND: u32 = ConstraintKind::Shear as u32;
 const TETHER_KIND: u32 = ConstraintKind::Tether as u32;

@@ -1,23 +1,47 @@
-//! Encodes a picture as PNG.
+//! Paints a picture, and encodes it as PNG.
 
-use anyhow::Context;
 use glam::DVec2;
 use tiny_skia::{
     FillRule, LineCap, LineJoin, Paint, Path, PathBuilder, Pixmap, Rect, StrokeDash, Transform,
 };
 
 use super::font;
-use super::shape::{BACKGROUND, Color, Picture, Shape, Stroke, Text};
+use super::shape::{BACKGROUND, Color, Picture, Shape, Size, Stroke, Text};
 
-/// Returns the bytes of the file. Equal pictures give equal bytes.
-pub(crate) fn encode(picture: &Picture) -> anyhow::Result<Vec<u8>> {
-    Ok(rasterize(picture)?.encode_png()?)
+/// The reason why a picture cannot be painted.
+#[derive(Debug, thiserror::Error)]
+pub enum PictureError {
+    /// It has no pixels, or too many.
+    #[error("a picture of {}x{} pixels cannot be painted", .0.width, .0.height)]
+    Size(Size),
+    /// The encoder failed.
+    #[error("cannot encode the picture: {0}")]
+    Encoding(String),
 }
 
-/// Returns the pixels of a picture, all of them opaque.
-pub(super) fn rasterize(picture: &Picture) -> anyhow::Result<Pixmap> {
+/// Returns the bytes of the file. Equal pictures give equal bytes.
+///
+/// # Errors
+/// The picture has no pixels, or more than fit into memory.
+pub fn encode(picture: &Picture) -> Result<Vec<u8>, PictureError> {
+    let pixmap = paint_all(picture)?;
+    pixmap.encode_png().map_err(|error| PictureError::Encoding(error.to_string()))
+}
+
+/// Returns the pixels of a picture, row by row from the top: red, green and blue.
+///
+/// # Errors
+/// Same as [`encode`].
+pub fn rasterize(picture: &Picture) -> Result<Vec<u8>, PictureError> {
+    let pixmap = paint_all(picture)?;
+    // No pixel is transparent.
+    let pixels = pixmap.pixels().iter();
+    Ok(pixels.flat_map(|pixel| [pixel.red(), pixel.green(), pixel.blue()]).collect())
+}
+
+fn paint_all(picture: &Picture) -> Result<Pixmap, PictureError> {
     let size = picture.size;
-    let mut pixmap = Pixmap::new(size.width, size.height).context("the picture has no pixels")?;
+    let mut pixmap = Pixmap::new(size.width, size.height).ok_or(PictureError::Size(size))?;
     let [red, green, blue] = BACKGROUND.0;
     pixmap.fill(tiny_skia::Color::from_rgba8(red, green, blue, u8::MAX));
     for shape in &picture.shapes {

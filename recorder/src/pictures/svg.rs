@@ -5,7 +5,7 @@ use glam::DVec2;
 use super::shape::{BACKGROUND, Color, Picture, Shape, Stroke, Text};
 
 /// Returns the text of the file. Equal pictures give equal texts.
-pub(crate) fn encode(picture: &Picture) -> String {
+pub fn encode(picture: &Picture) -> String {
     let (width, height) = (picture.size.width, picture.size.height);
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" \

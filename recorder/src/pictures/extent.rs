@@ -2,11 +2,11 @@
 //! outliers.
 
 use glam::{DQuat, DVec3};
-use recorder::ShapeRow;
 use sim_contract::{ParticleState, PlainF32};
 use sim_solver::scene::ColliderMesh;
 
-use crate::export::scene_state::SceneState;
+use crate::log::ShapeRow;
+use crate::scene_state::SceneState;
 
 /// One in this many particles may be an outlier, on each side of each axis.
 const PARTICLES_PER_OUTLIER: usize = 200;
@@ -20,12 +20,25 @@ const COLLIDER_DISTANCE: f64 = 2.0;
 
 /// An axis-aligned box.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Extent {
-    pub(crate) min: DVec3,
-    pub(crate) max: DVec3,
+pub struct Extent {
+    /// Least coordinates.
+    pub min: DVec3,
+    /// Greatest coordinates.
+    pub max: DVec3,
 }
 
 impl Extent {
+    /// Returns the box between two of its corners.
+    pub fn between(one: [f64; 3], other: [f64; 3]) -> Self {
+        let [one, other] = [one, other].map(DVec3::from_array);
+        Self { min: one.min(other), max: one.max(other) }
+    }
+
+    /// Returns true if no coordinate is infinite or NaN.
+    pub fn is_finite(&self) -> bool {
+        self.min.is_finite() && self.max.is_finite()
+    }
+
     /// Returns the box around all points, or `None` if there are none.
     pub(crate) fn around(points: impl IntoIterator<Item = DVec3>) -> Option<Self> {
         let points = points.into_iter().map(|point| Self { min: point, max: point });
@@ -66,7 +79,7 @@ impl Extent {
 
 /// Accumulates the extents of all frames.
 #[derive(Debug, Default)]
-pub(crate) struct ExtentTracker {
+pub struct ExtentTracker {
     particles: Option<Extent>,
     /// By index of the collider, over all frames.
     colliders: Vec<Option<Extent>>,
@@ -74,7 +87,7 @@ pub(crate) struct ExtentTracker {
 
 impl ExtentTracker {
     /// Adds a frame.
-    pub(crate) fn add(&mut self, state: &SceneState) {
+    pub fn add(&mut self, state: &SceneState) {
         self.particles = union(self.particles, extent_of_particles(&state.particles));
         if self.colliders.len() < state.colliders.len() {
             self.colliders.resize(state.colliders.len(), None);
@@ -90,7 +103,7 @@ impl ExtentTracker {
     }
 
     /// Returns the box to show. An empty scene has an empty box at the origin.
-    pub(crate) fn extent(&self) -> Extent {
+    pub fn extent(&self) -> Extent {
         let colliders = self.colliders.iter().flatten().copied();
         let reach = self.particles.filter(|particles| particles.size() != DVec3::ZERO);
         let reach = reach.map(|particles| particles.grown(COLLIDER_DISTANCE));

@@ -1,13 +1,13 @@
 //! Colliders as shapes, from back to front.
 
 use glam::{DQuat, DVec3};
-use recorder::ShapeRow;
 use sim_solver::scene::ColliderMesh;
 
 use super::camera::Camera;
 use super::extent::{Extent, box_corners, mesh_corners, plain};
 use super::shape::{Color, Shape, Stroke};
-use crate::export::scene_state::SceneState;
+use crate::log::ShapeRow;
+use crate::scene_state::SceneState;
 
 const FILL: Color = Color([0xd9, 0xde, 0xe4]);
 const OUTLINE: Color = Color([0x8d, 0x98, 0xa5]);
@@ -183,13 +183,12 @@ fn clip(corners: &[DVec3], axis: DVec3, limit: f64) -> Vec<DVec3> {
 #[cfg(test)]
 mod tests {
     use glam::DVec2;
-    use recorder::{ColliderDetails, ColliderRow};
     use sim_contract::PlainF32;
     use sim_solver::scene::Up;
 
     use super::*;
-    use crate::export::pictures::camera::{Basis, View};
-    use crate::export::pictures::shape::Size;
+    use crate::log::{ColliderDetails, ColliderRow};
+    use crate::pictures::{Basis, Size, View};
 
     const ROOM: Extent = Extent { min: DVec3::NEG_ONE, max: DVec3::ONE };
 

@@ -4,60 +4,99 @@ use glam::DVec2;
 
 /// Width and height of a picture, in pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Size {
-    pub(crate) width: u32,
-    pub(crate) height: u32,
+pub struct Size {
+    /// Width in pixels.
+    pub width: u32,
+    /// Height in pixels.
+    pub height: u32,
 }
 
 /// A picture as shapes from back to front.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Picture {
-    pub(crate) size: Size,
-    pub(crate) shapes: Vec<Shape>,
+pub struct Picture {
+    /// Its size.
+    pub size: Size,
+    /// From back to front.
+    pub shapes: Vec<Shape>,
 }
 
 /// Red, green, blue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Color(pub(crate) [u8; 3]);
+pub struct Color(
+    /// The three parts.
+    pub [u8; 3],
+);
 
 /// The background color.
-pub(crate) const BACKGROUND: Color = Color([0xf8, 0xf8, 0xf5]);
+pub const BACKGROUND: Color = Color([0xf8, 0xf8, 0xf5]);
 
 /// The style of a line.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Stroke {
-    pub(crate) color: Color,
+pub struct Stroke {
+    /// Its color.
+    pub color: Color,
     /// In pixels.
-    pub(crate) width: f64,
-    pub(crate) dash: Dash,
+    pub width: f64,
+    /// Its dashes.
+    pub dash: Dash,
 }
 
 /// The dash pattern of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Dash {
+pub enum Dash {
+    /// None.
     Solid,
+    /// Dashes as long as the gaps between them.
     Dashed,
+    /// Dots.
     Dotted,
 }
 
 /// One element of a picture. x points to the right and y down. Line ends and corners are round.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Shape {
-    Polygon { corners: Vec<DVec2>, fill: Color, outline: Option<Stroke> },
-    Segment { ends: [DVec2; 2], stroke: Stroke },
-    Circle { center: DVec2, radius: f64, fill: Color, outline: Option<Stroke> },
+pub enum Shape {
+    /// A filled polygon.
+    Polygon {
+        /// In order around it.
+        corners: Vec<DVec2>,
+        /// Color inside.
+        fill: Color,
+        /// Line around it.
+        outline: Option<Stroke>,
+    },
+    /// A straight line.
+    Segment {
+        /// Its ends.
+        ends: [DVec2; 2],
+        /// Its line.
+        stroke: Stroke,
+    },
+    /// A filled circle.
+    Circle {
+        /// Its center.
+        center: DVec2,
+        /// Its radius.
+        radius: f64,
+        /// Color inside.
+        fill: Color,
+        /// Line around it.
+        outline: Option<Stroke>,
+    },
+    /// A line of text.
     Text(Text),
 }
 
 /// One line of text in letters of 5 x 7 cells.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Text {
+pub struct Text {
     /// Upper left corner.
-    pub(crate) corner: DVec2,
+    pub corner: DVec2,
     /// Side of a cell in pixels.
-    pub(crate) cell: u32,
-    pub(crate) color: Color,
-    pub(crate) line: String,
+    pub cell: u32,
+    /// Its color.
+    pub color: Color,
+    /// The letters.
+    pub line: String,
 }
 
 /// Largest drawable coordinate, in pixels. The encoders keep enough digits up to this limit.
@@ -65,13 +104,13 @@ const COORDINATE_MAX: f64 = 1e6;
 
 impl Stroke {
     /// Returns a solid line.
-    pub(crate) fn solid(color: Color, width: f64) -> Self {
+    pub fn solid(color: Color, width: f64) -> Self {
         Self { color, width, dash: Dash::Solid }
     }
 
     /// Returns the lengths of a dash and of the gap after it, in pixels. Returns `None` for a solid
     /// line.
-    pub(crate) fn dashes(&self) -> Option<[f64; 2]> {
+    pub fn dashes(&self) -> Option<[f64; 2]> {
         match self.dash {
             Dash::Solid => None,
             Dash::Dashed => Some([4.0 * self.width, 4.0 * self.width]),
@@ -83,7 +122,7 @@ impl Stroke {
 
 impl Shape {
     /// Returns `true` if all coordinates are finite and within [`COORDINATE_MAX`].
-    pub(crate) fn is_drawable(&self) -> bool {
+    pub fn is_drawable(&self) -> bool {
         let is_near =
             |point: &DVec2| point.is_finite() && point.abs().max_element() < COORDINATE_MAX;
         match self {
@@ -104,7 +143,7 @@ impl Color {
         clippy::cast_sign_loss,
         reason = "a fraction of a byte, rounded, is a byte"
     )]
-    pub(crate) fn times(self, share: f64) -> Self {
+    pub fn times(self, share: f64) -> Self {
         Self(self.0.map(|part| (f64::from(part) * share).round() as u8))
     }
 }

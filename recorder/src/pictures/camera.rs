@@ -18,7 +18,7 @@ const TILT: (f64, f64) = (0.342_020_143_325_668_7, 0.939_692_620_785_908_4);
 
 /// The direction of view.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum View {
+pub enum View {
     /// Along the depth axis, with x to the right and the scene's up axis up
     Front,
     /// From the right-hand side of the front view
@@ -31,16 +31,18 @@ pub(crate) enum View {
 
 /// A right-handed orthonormal basis.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Basis {
-    pub(crate) right: DVec3,
-    pub(crate) up: DVec3,
+pub struct Basis {
+    /// To the right in the picture.
+    pub right: DVec3,
+    /// Up in the picture.
+    pub up: DVec3,
     /// From the scene to the viewer.
-    pub(crate) toward: DVec3,
+    pub toward: DVec3,
 }
 
 /// Maps points of the scene to pixels.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Camera {
+pub struct Camera {
     basis: Basis,
     /// The center of the picture, in coordinates along right and up.
     center: DVec2,
@@ -50,7 +52,8 @@ pub(crate) struct Camera {
 }
 
 impl Basis {
-    pub(crate) fn new(view: View, up: Up) -> Self {
+    /// Returns the basis of a view of a scene.
+    pub fn new(view: View, up: Up) -> Self {
         let front = Self::front(up);
         match view {
             View::Front => front,
@@ -79,7 +82,7 @@ impl Basis {
 
 impl View {
     /// Returns the view along the axis in which the scene is flat, or else [`Self::Iso`].
-    pub(crate) fn best_for(extent: &Extent, up: Up) -> Self {
+    pub fn best_for(extent: &Extent, up: Up) -> Self {
         let size = extent.size();
         let is_along_flat_axis = |view: &Self| {
             let depth = Basis::new(*view, up).toward.abs().dot(size);
@@ -94,7 +97,7 @@ impl View {
 
 impl Camera {
     /// Fits `extent` into the picture.
-    pub(crate) fn fit(basis: Basis, extent: &Extent, size: Size) -> Self {
+    pub fn fit(basis: Basis, extent: &Extent, size: Size) -> Self {
         let flat = |point: DVec3| DVec2::new(point.dot(basis.right), point.dot(basis.up));
         let corners = extent.corners().map(flat);
         let min = corners.into_iter().fold(corners[0], DVec2::min);

@@ -1,0 +1,282 @@
+//! The state of a scene at a snapshot, with everything that pictures and meshes show.
+
+use std::collections::BTreeSet;
+use std::io::Read;
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+use sim_contract::{ColliderState, ConstraintKind, ConstraintState, ParticleState, Torn, Triangle};
+use sim_solver::scene::{ColliderMesh, ColliderMeshes};
+use sim_solver::{Scene, Solver};
+
+use crate::log::{
+    ColliderRow, CollidersRow, ForcesRow, Frame, FrameReader, LogReader, Message, OutcomeRow,
+    ReadError, ShapeRow, StepRow, Tape, TapeError, TearTracker, constraint_state,
+};
+use crate::recorded_scene::recorded_scene;
+use crate::simulation::{colliders_row, forces_row, step_row};
+
+const STRUCTURAL_KIND: u32 = ConstraintKind::Structural as u32;
+
+/// The reason why the state of a recording cannot be shown.
+#[derive(Debug, thiserror::Error)]
+pub enum SceneStateError {
+    /// The file cannot be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// The file has no such state.
+    #[error(transparent)]
+    Tape(#[from] TapeError),
+    /// Columns of /topology differ in length.
+    #[error("the columns of /topology differ in length")]
+    Topology,
+    /// /surface has part of a triangle.
+    #[error("the number of indices in /surface is not a multiple of three")]
+    Surface,
+    /// A torn constraint does not exist.
+    #[error("constraint {constraint} is torn but not in /topology")]
+    Torn {
+        /// Its index.
+        constraint: u32,
+    },
+    /// A constraint or a triangle has an end that does not exist.
+    #[error(
+        "the snapshot of step {step} has {count} particles, but /topology or /surface refers to particle {index}"
+    )]
+    Particle {
+        /// Step of the snapshot.
+        step: u64,
+        /// Number of its particles.
+        count: usize,
+        /// Index of the particle.
+        index: u32,
+    },
+}
+
+/// The state at one snapshot.
+#[derive(Debug, Clone, Default)]
+pub struct SceneState {
+    /// The row of its step.
+    pub row: StepRow,
+    /// The particles.
+    pub particles: Vec<ParticleState>,
+    /// The constraints as loaded.
+    pub constraints: Vec<ConstraintState>,
+    /// By constraint index: torn at or before the step.
+    pub is_torn: Vec<bool>,
+    /// The triangles as loaded.
+    pub triangles: Vec<Triangle>,
+    /// In their poses after the step.
+    pub colliders: Vec<ColliderRow>,
+    /// The triangles of the colliders, once one of them is a mesh.
+    pub collider_meshes: Option<Arc<ColliderMeshes>>,
+    /// The outcomes of commands that no visited state before contains; some may be those of later steps.
+    pub outcomes: Vec<OutcomeRow>,
+    /// The forces of the step, if the recording has them.
+    pub forces: Option<ForcesRow>,
+}
+
+/// Reads a recording and calls `visit` with its state at each of `steps`, which ascend, until
+/// `visit` breaks.
+///
+/// # Errors
+/// The file cannot be read, its messages contradict each other, or `visit` fails.
+pub fn visit_states<R: Read, E: From<SceneStateError>>(
+    log: LogReader<R>,
+    steps: &[u64],
+    mut visit: impl FnMut(&SceneState) -> Result<ControlFlow<()>, E>,
+) -> Result<(), E> {
+    let mut steps = steps.iter().copied().peekable();
+    let mut frames = FrameReader::new(log);
+    let mut state = SceneState::default();
+    let mut tears = TearTracker::new(Torn::default());
+    while steps.peek().is_some() {
+        let Some(frame) = frames.next_frame().map_err(SceneStateError::from)? else { break };
+        state.apply_frame(frame, &mut tears)?;
+        state.read_meshes(frames.log());
+        if steps.next_if_eq(&state.row.step).is_some() {
+            state.set_torn(tears.at(state.row.step))?;
+            state.check_indices()?;
+            if visit(&state)?.is_break() {
+                break;
+            }
+            // A batch of the recorder may contain outcomes of later steps.
+            let step = state.row.step;
+            state.outcomes.retain(|row| row.step > step);
+        }
+    }
+    Ok(())
+}
+
+impl SceneState {
+    /// Reads the state at a recorded step. `scene` has the triangles of colliders that are meshes.
+    ///
+    /// # Errors
+    /// The file cannot be read, or its messages contradict each other.
+    pub fn of_tape(
+        tape: &mut Tape,
+        step: u64,
+        scene: Option<&Scene>,
+    ) -> Result<Self, SceneStateError> {
+        let found = tape.state_at(step)?;
+        let constraints = tape.topology().constraints().ok_or(SceneStateError::Topology)?;
+        let mut state = Self {
+            row: found.row,
+            particles: found.particles.to_vec(),
+            is_torn: vec![false; constraints.len()],
+            constraints,
+            triangles: tape.surface().triangles().ok_or(SceneStateError::Surface)?,
+            colliders: found.colliders.map_or_else(Vec::new, |row| row.colliders),
+            ..Self::default()
+        };
+        state.set_torn(Some(&found.torn))?;
+        if state.has_meshes() {
+            state.collider_meshes = scene.map(|scene| Arc::new(scene.collider_meshes()));
+        }
+        state.check_indices()?;
+        Ok(state)
+    }
+
+    /// Returns the state of a solver after a step.
+    pub fn of_solver(solver: &Solver, scene: &Scene, step: u64) -> Self {
+        let constraints: Vec<_> = solver.constraints().map(constraint_state).collect();
+        let mut is_torn = vec![false; constraints.len()];
+        for constraint in solver.torn() {
+            is_torn[*constraint as usize] = true;
+        }
+        let triangles = solver.triangles().iter();
+        let mut state = Self {
+            row: step_row(solver, step),
+            particles: bytemuck::cast_slice(solver.particles()).to_vec(),
+            constraints,
+            is_torn,
+            triangles: triangles.map(|corners| Triangle { corners: *corners }).collect(),
+            colliders: colliders_row(solver, step).colliders,
+            forces: forces_row(solver, step),
+            ..Self::default()
+        };
+        if state.has_meshes() {
+            state.collider_meshes = Some(Arc::new(scene.collider_meshes()));
+        }
+        state
+    }
+
+    fn apply_frame(
+        &mut self,
+        frame: Frame,
+        tears: &mut TearTracker,
+    ) -> Result<(), SceneStateError> {
+        self.forces = None;
+        for message in &frame.updates {
+            if let Message::Topology(row) = message {
+                *tears = TearTracker::new(row.torn_before());
+            }
+            tears.process(message);
+            self.apply_message(message)?;
+        }
+        self.row = frame.row;
+        self.particles = frame.particles.unwrap_or_default();
+        Ok(())
+    }
+
+    fn apply_message(&mut self, message: &Message) -> Result<(), SceneStateError> {
+        match message {
+            Message::Topology(row) => {
+                self.constraints = row.constraints().ok_or(SceneStateError::Topology)?;
+                self.is_torn = vec![false; self.constraints.len()];
+            }
+            Message::Surface(row) => {
+                self.triangles = row.triangles().ok_or(SceneStateError::Surface)?;
+            }
+            Message::Colliders(row) => self.colliders.clone_from(&row.colliders),
+            Message::Outcome(row) => self.outcomes.push(row.clone()),
+            Message::Forces(row) => self.forces = Some(row.clone()),
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// Reads the triangles from the scene of the recording. Without a readable scene, there are none.
+    fn read_meshes<R: Read>(&mut self, log: &LogReader<R>) {
+        if self.collider_meshes.is_none() && self.has_meshes() {
+            let meshes = recorded_scene(log).map(|scene| scene.collider_meshes());
+            self.collider_meshes = Some(Arc::new(meshes.unwrap_or_default()));
+        }
+    }
+
+    fn has_meshes(&self) -> bool {
+        self.colliders.iter().any(|one| matches!(one.shape, ShapeRow::Mesh { .. }))
+    }
+
+    /// Returns the triangles of a collider that is a mesh.
+    pub fn collider_mesh(&self, collider: usize) -> Option<&ColliderMesh> {
+        self.collider_meshes.as_ref()?.get(&collider)
+    }
+
+    fn set_torn(&mut self, torn: Option<&Torn>) -> Result<(), SceneStateError> {
+        self.is_torn.fill(false);
+        for constraint in torn.iter().flat_map(|torn| torn.indices()) {
+            let is_torn = self.is_torn.get_mut(constraint as usize);
+            *is_torn.ok_or(SceneStateError::Torn { constraint })? = true;
+        }
+        Ok(())
+    }
+
+    /// Returns the colliders as a node publishes them.
+    pub fn collider_states(&self) -> Vec<ColliderState> {
+        let (step, colliders) = (self.row.step, self.colliders.clone());
+        CollidersRow { step, colliders }.states()
+    }
+
+    /// Returns the constraints that are not torn.
+    pub fn untorn_constraints(&self) -> impl Iterator<Item = &ConstraintState> {
+        let constraints = self.constraints.iter().zip(&self.is_torn);
+        constraints.filter(|(_, is_torn)| !**is_torn).map(|(constraint, _)| constraint)
+    }
+
+    /// Returns the index and the corners of each triangle without a torn structural edge.
+    pub fn intact_triangles(&self) -> impl Iterator<Item = (usize, [u32; 3])> {
+        let torn_edges: BTreeSet<_> = (self.constraints.iter().zip(&self.is_torn))
+            .filter(|(constraint, is_torn)| **is_torn && constraint.kind == STRUCTURAL_KIND)
+            .map(|(constraint, _)| edge(constraint.a, constraint.b))
+            .collect();
+        let is_intact = move |[a, b, c]: [u32; 3]| {
+            let edges = [edge(a, b), edge(b, c), edge(c, a)];
+            torn_edges.is_empty() || !edges.iter().any(|edge| torn_edges.contains(edge))
+        };
+        let triangles = self.triangles.iter().map(|triangle| triangle.corners).enumerate();
+        triangles.filter(move |(_, corners)| is_intact(*corners))
+    }
+
+    /// Returns for each particle whether an untorn constraint or an intact triangle uses it.
+    pub fn connected(&self) -> Vec<bool> {
+        let mut is_connected = vec![false; self.particles.len()];
+        let ends = self.untorn_constraints().flat_map(|constraint| [constraint.a, constraint.b]);
+        let corners = self.intact_triangles().flat_map(|(_, corners)| corners);
+        for index in ends.chain(corners) {
+            is_connected[index as usize] = true;
+        }
+        is_connected
+    }
+
+    /// Checks that all constraints and triangles refer to existing particles.
+    ///
+    /// # Errors
+    /// The first that does not.
+    pub fn check_indices(&self) -> Result<(), SceneStateError> {
+        let ends = self.constraints.iter().flat_map(|constraint| [constraint.a, constraint.b]);
+        let corners = self.triangles.iter().flat_map(|triangle| triangle.corners);
+        let (step, count) = (self.row.step, self.particles.len());
+        match ends.chain(corners).max() {
+            Some(index) if index as usize >= count => {
+                Err(SceneStateError::Particle { step, count, index })
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Returns the edge with its ends in ascending order.
+fn edge(a: u32, b: u32) -> (u32, u32) {
+    (a.min(b), a.max(b))
+}
