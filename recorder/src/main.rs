@@ -7,7 +7,6 @@ mod commands;
 mod export;
 mod input;
 
-use clap::error::{ContextKind, ErrorKind};
 use clap::{CommandFactory, Parser, Subcommand};
 use sim_cli::DocumentVerb;
 
@@ -73,7 +72,10 @@ enum Command {
 }
 
 fn main() -> Exit {
-    let args = Args::try_parse().unwrap_or_else(|error| exit::with_usage(&explain(error)));
+    let words: Vec<_> = std::env::args_os().collect();
+    let args = Args::try_parse_from(&words).unwrap_or_else(|error| {
+        exit::with_usage(&sim_cli::explain(error, &Args::command(), &words))
+    });
     exit::from_result(run(&args.command))
 }
 
@@ -94,29 +96,4 @@ fn run(command: &Command) -> anyhow::Result<Exit> {
         Command::Verify(args) => verify::run(args),
         Command::Document(document) => document.run(Args::command()).map(|()| Exit::Done),
     }
-}
-
-/// Returns `true` for an error of the command line of `export`.
-fn is_of_export(error: &clap::Error) -> bool {
-    let usage = error.get(ContextKind::Usage);
-    usage.is_some_and(|usage| usage.to_string().contains("recorder export "))
-}
-
-/// Replaces the text of clap for an unknown option, which speaks of an "unexpected argument".
-fn explain(error: clap::Error) -> clap::Error {
-    let (ErrorKind::UnknownArgument, Some(argument)) =
-        (error.kind(), error.get(ContextKind::InvalidArg))
-    else {
-        return error;
-    };
-    let suggestion = error.get(ContextKind::SuggestedArg);
-    let hint = suggestion.map_or_else(String::new, |name| format!(" (did you mean '{name}'?)"));
-    let text = if argument.to_string().starts_with('-') {
-        let formats = if is_of_export(&error) { export_command::formats() } else { String::new() };
-        format!("there is no option '{argument}' here{hint}{formats}")
-    } else {
-        format!("there is one argument too many: '{argument}'")
-    };
-    let text = text + "\n\nFor more information, try '--help'.\n";
-    clap::Error::raw(ErrorKind::UnknownArgument, text).with_cmd(&Args::command())
 }

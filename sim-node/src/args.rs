@@ -8,18 +8,19 @@ mod endpoint;
 mod lesson;
 mod parameter;
 mod real_time;
-mod refusal;
 mod run;
 mod scene;
 mod value;
 
 use std::ffi::OsString;
 
-use clap::error::ErrorKind;
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::parser::ValueSource;
 use clap::{ArgMatches, Command, CommandFactory, FromArgMatches, Parser, Subcommand};
 use sim_cli::DocumentVerb;
 use sim_contract::console;
+use sim_solver::builtin;
+use sim_solver::scene::is_path;
 
 pub(crate) use bench::{BenchArgs, BenchClientArgs, ClientRole};
 pub(crate) use command::{CommandVerb, PoseArgs, RewindArgs, SetArgs};
@@ -96,15 +97,8 @@ pub(crate) enum Verb {
 #[allow(clippy::exit, reason = "clap ends the program in the same way")]
 pub(crate) fn parse() -> Args {
     try_parse(std::env::args_os()).unwrap_or_else(|error| {
-        let printed = match refusal::text(&error) {
-            Some(text) => {
-                console::note_lines(text.trim_end());
-                Ok(())
-            }
-            None => error.print(),
-        };
-        let (is_error, code) = (error.use_stderr(), error.exit_code());
-        std::process::exit(console::usage_exit_code(printed, is_error, code))
+        let (printed, code) = (error.print(), error.exit_code());
+        std::process::exit(console::usage_exit_code(printed, error.use_stderr(), code))
     })
 }
 
@@ -113,8 +107,12 @@ pub(crate) fn try_parse(
     words: impl IntoIterator<Item = impl Into<OsString>>,
 ) -> Result<Args, clap::Error> {
     let mut command = Args::command();
-    let words = words.into_iter().map(|word| plain_negative(word.into()));
-    let matches = command.try_get_matches_from_mut(words)?;
+    command.build();
+    let words: Vec<_> = words.into_iter().map(|word| plain_negative(word.into())).collect();
+    check_first_word(&mut command, &words)?;
+    let matches = command
+        .try_get_matches_from_mut(&words)
+        .map_err(|error| sim_cli::explain(error, &command, &words))?;
     check_order(&mut command, &matches)?;
     let mut args = Args::from_arg_matches(&matches).map_err(|error| error.format(&mut command))?;
     match &mut args.verb {
@@ -127,6 +125,34 @@ pub(crate) fn try_parse(
     check_value(&mut command, &args)?;
     check_run(&mut command, &args)?;
     Ok(args)
+}
+
+/// Refuses a first word that is more like a subcommand than like a scene, or is followed by words as no
+/// scene is: clap takes it for the scene of `run`, and would find fault with the word behind it.
+fn check_first_word(command: &mut Command, words: &[OsString]) -> Result<(), clap::Error> {
+    let Some(word) = words.get(1).and_then(|word| word.to_str()) else { return Ok(()) };
+    if word.starts_with('-')
+        || is_path(word)
+        || builtin::text(word).is_some()
+        || command.find_subcommand(word).is_some()
+    {
+        return Ok(());
+    }
+    let mut known = sim_cli::subcommands(command);
+    known.extend(builtin::names().map(str::to_owned));
+    let is_followed =
+        words.get(2).and_then(|next| next.to_str()).is_some_and(|next| !next.starts_with('-'));
+    let nearest = sim_cli::nearest(word, known.iter().map(String::as_str));
+    let nearest_verb = nearest.filter(|name| builtin::text(name).is_none()).map(str::to_owned);
+    if nearest_verb.is_none() && !is_followed {
+        return Ok(());
+    }
+    let mut error = clap::Error::new(ErrorKind::InvalidSubcommand).with_cmd(command);
+    error.insert(ContextKind::InvalidSubcommand, ContextValue::String(word.to_owned()));
+    if let Some(verb) = nearest_verb {
+        error.insert(ContextKind::SuggestedSubcommand, ContextValue::String(verb));
+    }
+    Err(error)
 }
 
 /// Subcommands that look at a whole domain, so that a name has no meaning for them.
@@ -195,7 +221,7 @@ mod tests {
     fn refused(line: &str) -> String {
         let error = try_parse(line.split(' ')).unwrap_err();
         assert_eq!(error.exit_code(), 2, "{line}");
-        refusal::text(&error).unwrap_or_else(|| error.to_string())
+        error.to_string()
     }
 
     #[test]
@@ -263,18 +289,37 @@ mod tests {
     #[test]
     fn unknown_options_and_stray_numbers_are_refused_without_advice_to_escape_them() {
         for (line, problem) in [
-            ("sim-node ctl pin -1", "the negative number '-1' is not allowed here"),
-            ("sim-node ctl status -3", "the negative number '-3' is not allowed here"),
-            ("sim-node ctl grab 3 -1 -2 0 --fast", "there is no option '--fast' here"),
-            ("sim-node run --spee 3", "there is no option '--spee' here"),
-            ("sim-node ctl pin 1 2", "there is one argument too many: '2'"),
+            ("sim-node ctl pin -1", "unexpected argument '-1' found"),
+            ("sim-node ctl status -3", "unexpected argument '-3' found"),
+            ("sim-node ctl grab 3 -1 -2 0 --fast", "unexpected argument '--fast' found"),
+            ("sim-node run --spee 3", "unexpected argument '--spee' found"),
+            ("sim-node ctl pin 1 2", "unexpected argument '2' found"),
+            ("sim-node foo bar", "unrecognized subcommand 'foo'"),
         ] {
             let text = refused(line);
             assert!(text.starts_with(&format!("error: {problem}")), "{line}: {text}");
             assert!(text.contains("--help") && !text.contains("tip:"), "{line}: {text}");
         }
-        let text = refused("sim-node ctl grab 3 -1 -2 0 --ove 1");
-        assert!(text.contains("(did you mean '--over'?)"), "{text}");
+    }
+
+    #[test]
+    fn a_misspelt_word_is_refused_with_the_nearest_one() {
+        for (line, tip) in [
+            ("sim-node rnu curtain", "a similar subcommand exists: 'run'"),
+            ("sim-node rnu", "a similar subcommand exists: 'run'"),
+            ("sim-node scene", "a similar subcommand exists: 'scenes'"),
+            ("sim-node ctl paus", "a similar subcommand exists: 'pause'"),
+            ("sim-node ctl grab 3 -1 -2 0 --ove 1", "a similar argument exists: '--over'"),
+            ("sim-node run --thraeds 2", "a similar argument exists: '--threads'"),
+            ("sim-node lesson eluer", "a similar value exists: 'euler'"),
+            ("sim-node ctl get gravty", "did you mean 'gravity'?"),
+            ("sim-node ctl get friction", "did you mean 'contact_friction'?"),
+        ] {
+            let text = refused(line);
+            assert!(text.contains(tip), "{line}: {text}");
+        }
+        // A scene: the error of its loader names the nearest one.
+        assert!(try_parse(["sim-node", "curtian"]).is_ok());
     }
 
     #[test]

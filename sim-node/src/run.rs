@@ -83,13 +83,14 @@ fn print_ready(endpoint: &Endpoint, node: &Node) {
     let threads = node.solver.threads();
     output::note(&format!(
         "ready: {endpoint}: scene {}, {} particles, {} constraints, {} Hz x {} substeps, \
-         {threads} thread{}",
+         {threads} thread{}; see it with: viewer-bridge{}",
         node.scene.name,
         node.solver.particle_count(),
         node.solver.constraint_count(),
         settings.rate_hz,
         settings.substeps,
         if threads == 1 { "" } else { "s" },
+        endpoint.options(),
     ));
 }
 

@@ -240,7 +240,13 @@ fn a_scene_that_cannot_be_read_is_refused_and_the_node_goes_on() {
     let wrong = sandbox.write("wrong.toml", "version = 1\nrate = 3\n");
     let refused = Process::run(Program::SimNode, &sandbox, &["ctl", "load", &wrong]);
     assert_eq!(refused.code, Some(1));
-    assert!(refused.stderr.contains("wrong.toml:2: rate: unknown key"), "{}", refused.stderr);
+    assert!(
+        refused
+            .stderr
+            .contains("wrong.toml:2: rate: unknown key (did you mean 'rate_hz' of [solver]?)"),
+        "{}",
+        refused.stderr
+    );
     // A device is not a scene, and the node does not block on reading it.
     let device = Action::Load { scene: Text::new("/dev/zero").unwrap() };
     let outcome = attach(&sandbox).request(device, DEADLINE).unwrap();

@@ -17,7 +17,7 @@ const ARROWS: [(&str, &[&str]); 10] = [
     ("sim-solver", &["sim-types"]),
     ("sim-contract", &["iceoryx2", "sim-types"]),
     ("sim-c", &["sim-contract"]),
-    ("sim-cli", &["sim-contract"]),
+    ("sim-cli", &["sim-contract", "sim-types"]),
     ("sim-lessons", &["sim-solver"]),
     ("sim-node", &["sim-cli", "sim-contract", "sim-lessons", "sim-solver"]),
     ("recorder", &["mcap", "sim-cli", "sim-contract", "sim-solver"]),

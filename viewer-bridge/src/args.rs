@@ -1,12 +1,12 @@
 //! The command line. The doc comments are the help texts.
 
-mod refusal;
-
 use std::ffi::OsString;
 use std::net::{IpAddr, SocketAddr};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
+use clap::builder::StyledStr;
+use clap::error::{ContextKind, ContextValue};
 use clap::{CommandFactory, Parser};
 use sim_cli::DocumentVerb;
 use sim_contract::{Endpoint, EndpointError, NAME_DEFAULT};
@@ -138,9 +138,22 @@ impl RecordingFolder {
 
 /// Reads the command line.
 pub(crate) fn parse(
-    words: impl IntoIterator<Item = impl Into<OsString> + Clone>,
+    words: impl IntoIterator<Item = impl Into<OsString>>,
 ) -> Result<Args, clap::Error> {
-    Args::try_parse_from(words).map_err(|error| refusal::explain(error, &Args::command()))
+    let words: Vec<OsString> = words.into_iter().map(Into::into).collect();
+    Args::try_parse_from(&words)
+        .map_err(|error| with_replay(sim_cli::explain(error, &Args::command(), &words)))
+}
+
+/// Adds to the error of a stray recording that it is shown by `--replay`.
+fn with_replay(mut error: clap::Error) -> clap::Error {
+    let word = error.get(ContextKind::InvalidArg).or(error.get(ContextKind::InvalidSubcommand));
+    let word = word.map(ToString::to_string).unwrap_or_default();
+    if Path::new(&word).extension().is_some_and(|extension| extension == "mcap") {
+        let tip = StyledStr::from(format!("to show a recording, use --replay {word}"));
+        error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![tip]));
+    }
+    error
 }
 
 impl Args {
@@ -255,22 +268,24 @@ mod tests {
     #[test]
     fn unknown_options_and_stray_arguments_are_refused_with_a_remedy() {
         for (argument, problem) in [
-            ("--bogus", "there is no option '--bogus' here\n"),
-            ("--lisen", "there is no option '--lisen' here (did you mean '--listen'?)\n"),
-            ("curtain", "there is one argument too many: 'curtain'\n"),
+            ("--bogus", "unexpected argument '--bogus' found"),
+            (
+                "--lisen",
+                "unexpected argument '--lisen' found\n\n  tip: a similar argument exists: '--listen'",
+            ),
+            ("curtain", "unrecognized subcommand 'curtain'"),
             (
                 "completion",
-                "there is one argument too many: 'completion' (did you mean 'completions'?)\n",
+                "unrecognized subcommand 'completion'\n\n  tip: a similar subcommand exists: 'completions'",
             ),
             (
                 "run.mcap",
-                "there is one argument too many: 'run.mcap' (to show a recording, use --replay \
-                 run.mcap)\n",
+                "unrecognized subcommand 'run.mcap'\n\n  tip: to show a recording, use --replay run.mcap",
             ),
         ] {
             let error = error(&[argument]);
-            assert!(error.starts_with(&format!("error: {problem}")), "{error}");
-            assert!(error.contains("--help") && !error.contains("tip:"), "{error}");
+            assert!(error.starts_with(&format!("error: {problem}\n")), "{error}");
+            assert!(error.contains("--help") && !error.contains("-- "), "{error}");
         }
     }
 

@@ -27,6 +27,7 @@ use crate::cli::file_args::{OverwriteArgs, refuse_own_input};
 use crate::cli::output::{self, AsJson};
 use crate::cli::parse::{self, whole_number_in};
 use crate::cli::progress::{progress_bar, progress_bytes};
+use crate::export::data::written_files::is_stdout;
 use crate::export::frame_names::FrameNames;
 use crate::export::pictures::target::Target;
 use crate::export::selection::{Choice, Moment, Selection, SnapshotRange};
@@ -116,12 +117,6 @@ enum StyleArg {
     Wires,
     /// Smooth surfaces; only where there is none, structural constraints and loose particles
     Shaded,
-}
-
-/// Returns the options of the formats in parentheses, for the error of an unknown option.
-pub(crate) fn formats() -> String {
-    let options: Vec<_> = format_args::options().map(|option| format!("--{option}")).collect();
-    format!(" (formats: {})", options.join(", "))
 }
 
 pub(crate) fn run(args: &ExportArgs) -> anyhow::Result<Exit> {
@@ -215,6 +210,11 @@ fn export<R: Read>(
         }
         Format::Data(format, target) => {
             let written = data::write(&snapshots, format, target, existing)?;
+            // On stdout, the result is the file.
+            if is_stdout(target) {
+                output::note(&written.to_string());
+                return Ok(());
+            }
             output::result(args.as_json, &written, &written.to_string())
         }
     }

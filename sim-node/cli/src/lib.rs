@@ -1,6 +1,8 @@
-//! Subcommands that every program has: completion scripts and man pages, generated from its command
-//! line.
+//! The common parts of every program's command line: completion scripts and man pages, generated from it,
+//! and errors that suggest the nearest known word.
 #![forbid(unsafe_code)]
+
+mod explain;
 
 use std::path::{Path, PathBuf};
 use std::{fs, io};
@@ -10,6 +12,9 @@ use clap::{Command, Subcommand};
 use clap_complete::Shell;
 use clap_mangen::Man;
 use sim_contract::console;
+
+pub use explain::{explain, subcommands};
+pub use sim_types::{did_you_mean, nearest};
 
 /// Subcommands that generate documents.
 #[derive(Debug, Clone, Subcommand)]

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use clap::{Args as ClapArgs, Subcommand};
+use sim_cli::did_you_mean;
 use sim_contract::{NumberRange, PARAMETERS, Parameter};
 
 use super::command::CommandVerb;
@@ -152,7 +153,8 @@ impl NearestArgs {
 fn parameter(text: &str) -> Result<Parameter, String> {
     Parameter::from_name(text).ok_or_else(|| {
         format!(
-            "there is no such parameter (allowed: {})",
+            "there is no such parameter{} (allowed: {})",
+            did_you_mean(text, PARAMETERS.map(|info| info.name)),
             PARAMETERS.map(|info| info.name).join(", ")
         )
     })

@@ -27,6 +27,7 @@ mod parameter_values;
 mod particle_flags;
 mod range;
 mod reason;
+mod suggestion;
 mod tear_cause;
 mod text;
 
@@ -42,6 +43,7 @@ pub use parameter_values::{BlockValue, ParameterValues, PerKind, SETTINGS_COUNT,
 pub use particle_flags::ParticleFlags;
 pub use range::{COORDINATE_MAX, NumberRange, allowed_indices};
 pub use reason::Reason;
+pub use suggestion::{did_you_mean, nearest};
 pub use tear_cause::TearCause;
 pub use text::printable::{printable, printable_line};
 pub use text::{Text, TextError};

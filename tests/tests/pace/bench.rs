@@ -204,7 +204,7 @@ fn invalid_options_are_refused() {
         ("--duration 3", "it must be a time with its unit"),
         ("--rate 0", "it must be a whole number from 1 to 100000"),
         ("--realtime=100", "it must be a priority from 1 to 99"),
-        ("--steps 3", "there is no option '--steps' here"),
+        ("--steps 3", "unexpected argument '--steps' found"),
     ] {
         let args: Vec<_> = ["bench"].into_iter().chain(options.split(' ')).collect();
         let refused = Process::run(Program::SimNode, &sandbox, &args);

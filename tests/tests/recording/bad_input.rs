@@ -309,11 +309,11 @@ fn wrong_option_values_state_what_is_expected() {
         (&["play", "run.mcap", "--rate", "-1"], "it must be a number from 0.01 to 100"),
         (
             &["info", "run.mcap", "--jsn"],
-            "there is no option '--jsn' here (did you mean '--json'?)",
+            "unexpected argument '--jsn' found\n\n  tip: a similar argument exists: '--json'",
         ),
         (
             &["export", "run.mcap", "--fbx", "a.fbx"],
-            "there is no option '--fbx' here (formats: --png, --svg, ",
+            "unexpected argument '--fbx' found\n\nUsage: recorder export <--png <DIR>|--svg <DIR>|",
         ),
     ] {
         let refused = recorder(&sandbox, args);

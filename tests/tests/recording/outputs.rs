@@ -93,6 +93,10 @@ fn times_in_exported_data_are_those_of_the_run() {
     let text = std::fs::read_to_string(&table).unwrap();
     assert!(text.lines().nth(1).unwrap().starts_with("30,0.15,0,"), "{}", &text[..200]);
     assert!(text.lines().last().unwrap().starts_with("40,0.2,"));
+    // The path - is stdout, and the report goes to stderr.
+    let piped = recorder(&sandbox, &["export", &file, "--csv", "-"]);
+    assert_eq!((piped.code, piped.stdout.as_str()), (Some(0), text.as_str()));
+    assert!(piped.stderr.contains("-: 11 snapshots (steps 30..=40)"), "{}", piped.stderr);
 }
 
 #[test]

@@ -2,8 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::Args as _;
-
 use super::data::DataFormat;
 use crate::cli::output::path_text;
 use crate::export::pictures::target::PictureFormat;
@@ -25,7 +23,7 @@ pub(super) struct FormatArgs {
     /// their steps; and recorded forces, as impulses in N s
     #[arg(long, value_name = "FILE")]
     npz: Option<PathBuf>,
-    /// Write a table with a row for each particle of each snapshot
+    /// Write a table with a row for each particle of each snapshot; `-` is stdout
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
     /// Write VTP files and a PVD file with their times into this folder, for ParaView: velocity,
@@ -91,14 +89,6 @@ impl Format<'_> {
             Self::Pictures(_, target) | Self::Animation(target) | Self::Data(_, target) => target,
         }
     }
-}
-
-/// Returns the names of the options of all formats.
-pub(super) fn options() -> impl Iterator<Item = String> {
-    let command = FormatArgs::augment_args(clap::Command::new("formats"));
-    let names: Vec<_> =
-        command.get_arguments().filter_map(|one| one.get_long()).map(str::to_owned).collect();
-    names.into_iter()
 }
 
 impl FormatArgs {

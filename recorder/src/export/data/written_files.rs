@@ -1,12 +1,12 @@
 //! The files of an export, which all get their names or are all removed.
 
 use std::fs;
-use std::io::{self, Write};
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use anyhow::anyhow;
+use anyhow::{Context, anyhow};
 use recorder::{Existing, PartFile};
-use sim_contract::explain_write_error;
+use sim_contract::{console, explain_write_error};
 
 /// A file that keeps the first error of writing, which a format may wrap or take for one of its input.
 struct ObservedFile<'a> {
@@ -37,6 +37,37 @@ impl Write for ObservedFile<'_> {
     }
 }
 
+/// Returns `true` for the path `-`, which is stdout.
+pub(crate) fn is_stdout(path: &Path) -> bool {
+    path == Path::new("-")
+}
+
+/// Stdout, which notes that its reader wants no more.
+struct ResultStream<'a> {
+    is_closed: &'a mut bool,
+}
+
+impl Write for ResultStream<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        *self.is_closed |= !console::write_part(bytes)?;
+        if *self.is_closed { Err(io::ErrorKind::BrokenPipe.into()) } else { Ok(bytes.len()) }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+/// Writes a file to stdout. A pipe whose reader has gone ends it quietly.
+fn write_to_stdout(write: impl FnOnce(&mut dyn Write) -> anyhow::Result<()>) -> anyhow::Result<()> {
+    let mut is_closed = false;
+    let mut out = BufWriter::with_capacity(1 << 16, ResultStream { is_closed: &mut is_closed });
+    let result = write(&mut out).and_then(|()| out.flush().context("cannot write to stdout"));
+    // What is left in the buffer after an error is dropped.
+    let (_stream, _rest) = out.into_parts();
+    if is_closed { Ok(()) } else { result }
+}
+
 /// The files that an export has written so far.
 #[derive(Debug)]
 pub(crate) struct WrittenFiles {
@@ -64,12 +95,16 @@ impl WrittenFiles {
         Ok(())
     }
 
-    /// Writes a file piece by piece. It gets its name only when it is complete.
+    /// Writes a file piece by piece. It gets its name only when it is complete. The path `-` is stdout.
     pub(crate) fn add_streamed(
         &mut self,
         path: &Path,
         write: impl FnOnce(&mut dyn Write) -> anyhow::Result<()>,
     ) -> anyhow::Result<()> {
+        if is_stdout(path) {
+            self.paths.push(path.to_owned());
+            return write_to_stdout(write);
+        }
         let mut file = PartFile::create(path, self.existing)?;
         let mut observed = ObservedFile { file: &mut file, failure: None };
         if let Err(error) = write(&mut observed) {
@@ -86,7 +121,7 @@ impl WrittenFiles {
 
     /// Removes the files, so that nothing of an incomplete export is left.
     pub(crate) fn remove(self) {
-        for path in self.paths {
+        for path in self.paths.iter().filter(|path| !is_stdout(path)) {
             // An error of the export is reported already, and is more important.
             _ = fs::remove_file(path);
         }

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use sim_types::did_you_mean;
 use thiserror::Error;
 
 use super::definition::Scene;
@@ -21,7 +22,8 @@ pub enum LoadError {
     },
     /// No built-in scene has this name.
     #[error(
-        "there is no built-in scene '{0}' (allowed: {names}, or a path with / or ending in .toml)",
+        "there is no built-in scene '{0}'{meant} (allowed: {names}, or a path with / or ending in .toml)",
+        meant = did_you_mean(.0, builtin::names()),
         names = builtin::names().collect::<Vec<_>>().join(", ")
     )]
     UnknownName(String),

@@ -4,6 +4,7 @@ use crate::action::Action;
 use crate::limits::STEP_WORK_MAX;
 use crate::parameter::{OffMeaning, PARAMETERS, Parameter, ParameterInfo, ValueForm};
 use crate::reason::Reason;
+use crate::suggestion::nearest;
 use crate::text::Text;
 
 impl ParameterInfo {
@@ -37,9 +38,18 @@ impl Action {
                 Some("finite numbers, or off for no limit".to_owned())
             }
             Reason::NonFinite => Some("finite numbers".to_owned()),
-            Reason::UnknownParameter => Some(PARAMETERS.map(|info| info.name).join(", ")),
+            Reason::UnknownParameter => Some(self.known_parameters()),
             _ => None,
         }
+    }
+
+    /// Returns the names of all parameters, and the one that is nearest to that of this action.
+    fn known_parameters(&self) -> String {
+        let names = PARAMETERS.map(|info| info.name);
+        let Self::Set { parameter, .. } = self else { return names.join(", ") };
+        let nearest = nearest(parameter.as_str(), names);
+        let meant = nearest.map(|name| format!("; did you mean '{name}'?")).unwrap_or_default();
+        format!("{}{meant}", names.join(", "))
     }
 
     /// Returns the condition of the scene or its state under which this action has an effect, in words, if it was
@@ -169,6 +179,16 @@ mod tests {
         };
         let values = action.allowed_values(Reason::OutOfRange).unwrap();
         assert_eq!(values, "a number >= 0, or off for 0, no kind");
+    }
+
+    #[test]
+    fn a_misspelt_parameter_is_answered_with_the_nearest_one() {
+        let parameter = Text::cut("gravty");
+        let value = ParameterValue::Number(1.0);
+        let action = Action::Set { parameter, value, constraint_kind: None, block: None };
+        let values = action.allowed_values(Reason::UnknownParameter).unwrap();
+        assert!(values.starts_with("gravity, damping, "), "{values}");
+        assert!(values.ends_with("; did you mean 'gravity'?"), "{values}");
     }
 
     #[test]

@@ -348,9 +348,12 @@ impl<F: Fn(&str) -> String> ColliderFields<'_, '_, F> {
         let own = keys(shape);
         for (key, span) in self.file.shape_keys() {
             let Some(span) = span.filter(|_| !own.contains(&key)) else { continue };
+            let owners = ColliderShape::ALL.into_iter().filter(|one| keys(*one).contains(&key));
+            let owners: Vec<_> = owners.map(ColliderShape::name).collect();
             let problem = format!(
-                "unknown key of the shape {} (allowed: {} and the keys of every shape)",
+                "unknown key of the shape {}, a key of {} (allowed: {} and the keys of every shape)",
                 shape.name(),
+                owners.join(", "),
                 own.join(", ")
             );
             return self.reader.error(span, &(self.field)(key), problem);

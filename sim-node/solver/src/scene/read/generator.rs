@@ -96,9 +96,12 @@ impl GeneratorFields<'_, '_> {
         let known = self.reader.word(&self.name("shape"), name, &names)?;
         for (key, span) in self.file.shape_keys() {
             let Some(span) = span.filter(|_| !known.keys.contains(&key)) else { continue };
+            let owners = SHAPES.iter().filter(|shape| shape.keys.contains(&key));
+            let owners: Vec<_> = owners.map(|shape| shape.name).collect();
             let problem = format!(
-                "unknown key of the shape {} (allowed: {} and the keys of every shape)",
+                "unknown key of the shape {}, a key of {} (allowed: {} and the keys of every shape)",
                 known.name,
+                owners.join(", "),
                 known.keys.join(", ")
             );
             return self.reader.error(span, &self.name(key), problem);

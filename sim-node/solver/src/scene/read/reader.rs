@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::ops::{Range, RangeInclusive};
 
-use sim_types::{Method, NumberRange, Parameter};
+use sim_types::{Method, NumberRange, Parameter, did_you_mean};
 
 use super::value::{Number, Quaternion, Spanned, Vector, Whole, Word};
 use crate::scene::definition::anchor::NO_ROTATION;
@@ -220,7 +220,8 @@ impl Reader<'_> {
             return Ok(*choice);
         }
         let allowed = choices.iter().map(|(known, _)| *known).collect::<Vec<_>>().join(", ");
-        let problem = format!("\"{name}\" is unknown (allowed: {allowed})");
+        let meant = did_you_mean(name, choices.iter().map(|(known, _)| *known));
+        let problem = format!("\"{name}\" is unknown{meant} (allowed: {allowed})");
         self.error(word.span(), field, problem)
     }
 

@@ -1,6 +1,7 @@
 //! The TOML parser, with its errors in the words of this program.
 
 mod document;
+mod keys;
 mod parse_cost;
 mod pieces;
 
@@ -114,7 +115,10 @@ fn syntax_error(
     let span = span.unwrap_or(0..0);
     let message = message.trim().replace('\n', ", ");
     let (field, problem) = match () {
-        () if message.starts_with("unknown field ") => (path, unknown_key(&message)),
+        () if message.starts_with("unknown field ") => {
+            let problem = unknown_key(path.rsplit('.').next().unwrap_or_default(), &message);
+            (path, problem)
+        }
         () if message == "duplicate key" => duplicate_key(place, span.clone()),
         () if path.is_empty() => ("syntax".to_owned(), syntax_problem(&message)),
         () if is_list_of_tables(&path) && message.ends_with("expected a sequence") => {
@@ -141,11 +145,12 @@ fn is_list_of_tables(path: &str) -> bool {
     ["particle", "constraint", "bend", "collider", "anchor", "generate"].contains(&path)
 }
 
-/// From ``unknown field `x`, expected one of `a`, `b` ``. The path ends with the key.
-fn unknown_key(message: &str) -> String {
+/// From ``unknown field `x`, expected one of `a`, `b` ``.
+fn unknown_key(key: &str, message: &str) -> String {
     let allowed = message.split_once(", expected ").map_or("", |(_, allowed)| allowed);
     // Two keys are joined by "or".
-    format!("unknown key (allowed: {})", plain_words(&allowed.replace("` or `", "`, `")))
+    let allowed = plain_words(&allowed.replace("` or `", "`, `"));
+    format!("unknown key{} (allowed: {allowed})", keys::advice(key, allowed.split(", ")))
 }
 
 /// The error's span is the key.
