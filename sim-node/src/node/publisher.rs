@@ -76,9 +76,9 @@ pub(crate) struct Publisher {
     keyframes_due: u32,
     /// A reader has joined since the newest keyframe.
     is_reader_waiting: bool,
-    keyframe_step: u64,
-    /// Number of outcomes that the newest keyframe counts.
-    keyframe_outcome_count: u64,
+    /// Header and bytes of the newest keyframe, which is latched.
+    keyframe: KeyframeHeader,
+    keyframe_bytes: Vec<u8>,
     readers: ReaderCounts,
     /// A reader has joined the keyframes, and perhaps not yet the particles.
     is_reader_joining: bool,
@@ -128,8 +128,8 @@ impl Publisher {
             snapshot_count: 0,
             keyframes_due: 1,
             is_reader_waiting: false,
-            keyframe_step: 0,
-            keyframe_outcome_count: 0,
+            keyframe: KeyframeHeader::default(),
+            keyframe_bytes: Vec::new(),
             readers: ReaderCounts::default(),
             is_reader_joining: false,
             outcomes: Vec::new(),
@@ -375,8 +375,8 @@ impl Publisher {
             if self.is_reader_waiting {
                 self.keyframes_due = 0;
             }
-            let exists = self.keyframe_step == position.step;
-            let is_outdated = exists && self.keyframe_outcome_count != self.outcome_count;
+            let exists = self.keyframe.step == position.step;
+            let is_outdated = exists && self.keyframe.outcome_count != self.outcome_count;
             if is_outdated || (self.is_reader_waiting && !exists) {
                 self.publish_keyframe(solver, position)?;
                 self.owner.wake(Wake::Frame);
@@ -390,10 +390,24 @@ impl Publisher {
         if self.outcomes.is_empty() {
             return Ok(());
         }
+        self.announce_outcomes()?;
         for outcome in self.outcomes.drain(..) {
             self.owner.publish_outcome(&outcome)?;
         }
         self.owner.wake(Wake::Outcome);
+        Ok(())
+    }
+
+    /// Publishes the keyframe of the newest snapshot once more before outcomes that it does not count. A reader that
+    /// joins later receives this snapshot and this keyframe, but not these outcomes.
+    fn announce_outcomes(&mut self) -> anyhow::Result<()> {
+        let Self { keyframe, outcome_count, last, .. } = self;
+        let is_of_last = (keyframe.run_id, keyframe.step) == (last.run_id, last.step);
+        let follow = keyframe.outcome_count < *outcome_count;
+        if is_of_last && follow && keyframe.precedes_outcomes() {
+            keyframe.published_outcome_count = *outcome_count;
+            self.owner.publish_keyframe(*keyframe, &self.keyframe_bytes)?;
+        }
         Ok(())
     }
 
@@ -418,16 +432,16 @@ impl Publisher {
     fn publish_keyframe(&mut self, solver: &Solver, position: Position) -> anyhow::Result<()> {
         let mut keyframe = solver.keyframe();
         keyframe.paused = position.is_paused;
-        let bytes = keyframe.encode();
-        let header = KeyframeHeader {
+        self.keyframe_bytes = keyframe.encode();
+        self.keyframe = KeyframeHeader {
             run_id: self.run_id,
             step: position.step,
-            size_bytes: bytes.len() as u64,
+            size_bytes: self.keyframe_bytes.len() as u64,
             outcome_count: self.outcome_count,
+            published_outcome_count: self.outcome_count,
         };
-        self.owner.publish_keyframe(header, &bytes)?;
+        self.owner.publish_keyframe(self.keyframe, &self.keyframe_bytes)?;
         self.is_reader_waiting = false;
-        (self.keyframe_step, self.keyframe_outcome_count) = (position.step, self.outcome_count);
         Ok(())
     }
 
@@ -438,7 +452,7 @@ impl Publisher {
             run_id: self.run_id,
             step: position.step,
             scene_step: solver.scene_step(),
-            keyframe_step: self.keyframe_step,
+            keyframe_step: self.keyframe.step,
             sim_time_ns: time_of_step_ns(position.step, self.rate_hz),
             publish_monotonic_ns: monotonic_ns(),
             state_hash: solver.state_hash(),

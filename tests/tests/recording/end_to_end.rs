@@ -161,18 +161,24 @@ fn a_recording_that_starts_during_a_grab_verifies() {
 
 #[test]
 fn a_recording_that_starts_while_the_node_is_paused_verifies() {
-    let sandbox = Sandbox::new();
-    let file = sandbox.path("paused.mcap");
-    let _node = node(&sandbox, &["run", "curtain", "--paused"]);
-    ctl(&sandbox, &["step", "20"]);
-    // A command is pending when the recorder attaches, so it cannot record step 20 as published.
-    ctl(&sandbox, &["grab", "90", "0.5", "0.2", "0.3"]);
-    let recording = ready_recorder(&sandbox, &file);
-    ctl(&sandbox, &["step", "30"]);
-    assert_eq!(recording.interrupt().code, Some(0));
-    let steps: Vec<_> = frames(&file).iter().map(|frame| frame.row.step).collect();
-    assert_eq!(steps, (21..=50).collect::<Vec<_>>());
-    assert_eq!(assert_verifies(&sandbox, &file), 29);
+    for has_keyframe in [false, true] {
+        let sandbox = Sandbox::new();
+        let file = sandbox.path("paused.mcap");
+        let _node = node(&sandbox, &["run", "curtain", "--paused"]);
+        ctl(&sandbox, &["step", "20"]);
+        if has_keyframe {
+            // The node publishes one for this reader, and later readers receive it.
+            recorder(&sandbox, &["state", "-o", &sandbox.path("state.mcap")]).success();
+        }
+        // A command is pending when the recorder attaches, so it cannot record step 20 as published.
+        ctl(&sandbox, &["grab", "90", "0.5", "0.2", "0.3"]);
+        let recording = ready_recorder(&sandbox, &file);
+        ctl(&sandbox, &["step", "30"]);
+        assert_eq!(recording.interrupt().code, Some(0));
+        let steps: Vec<_> = frames(&file).iter().map(|frame| frame.row.step).collect();
+        assert_eq!(steps, (21..=50).collect::<Vec<_>>(), "{has_keyframe}");
+        assert_eq!(assert_verifies(&sandbox, &file), 29);
+    }
 }
 
 #[test]

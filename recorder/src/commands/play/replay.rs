@@ -209,8 +209,7 @@ impl Replay {
     }
 
     fn publish_keyframe(&mut self, step: u64, bytes: &[u8]) -> anyhow::Result<()> {
-        let size_bytes = bytes.len() as u64;
-        let header = KeyframeHeader { run_id: self.run_id, step, size_bytes, outcome_count: 0 };
+        let header = KeyframeHeader { run_id: self.run_id, step, ..KeyframeHeader::default() };
         self.owner.publish_keyframe(header, bytes)?;
         self.is_keyframe_wanted = false;
         Ok(())

@@ -57,7 +57,7 @@ impl FirstState {
     }
 
     /// Adds the keyframe of this state, and counts the outcomes since that have not changed it: they are not published
-    /// again. Ignores keyframes of other states.
+    /// again. Ignores keyframes of other states, and those that have come after outcomes that this recording lacks.
     pub(crate) fn add_keyframe(&mut self, keyframe: &KeyframeHeader, bytes: &[u8]) {
         let change = Change::Keyframe(*keyframe, bytes.to_vec());
         if !is_keyframe_of(&change, &self.header) {
@@ -84,7 +84,9 @@ fn own_tear_count(snapshot: &SnapshotHeader, tears: &TearsHeader) -> usize {
     if tears.step == snapshot.step { tears.new_count as usize } else { 0 }
 }
 
+/// Returns `true` for a keyframe of a snapshot from which a recording has all outcomes.
 fn is_keyframe_of(change: &Change, snapshot: &SnapshotHeader) -> bool {
     matches!(change, Change::Keyframe(keyframe, _)
-        if (keyframe.run_id, keyframe.step) == (snapshot.run_id, snapshot.step))
+        if (keyframe.run_id, keyframe.step) == (snapshot.run_id, snapshot.step)
+            && keyframe.precedes_outcomes())
 }

@@ -177,7 +177,7 @@ mod tests {
         let outcome = Outcome::new(4, 2, Command::new(1, 1, Action::Reset), Ok(()));
         let outcome = Outcome { run_id: RUN_ID, ..outcome };
         let tears = TearsHeader { run_id: RUN_ID, count: 3, ..TearsHeader::default() };
-        let keyframe = KeyframeHeader { run_id: RUN_ID, step: 2, size_bytes: 0, outcome_count: 0 };
+        let keyframe = KeyframeHeader { run_id: RUN_ID, step: 2, ..KeyframeHeader::default() };
         let cases = [
             (SnapshotHeader { outcome_count: 5, ..snapshot(2) }, Update::Outcome(&outcome)),
             (SnapshotHeader { torn_count: 3, ..snapshot(2) }, Update::Tears(&tears, &[])),

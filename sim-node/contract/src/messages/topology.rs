@@ -93,7 +93,7 @@ pub struct LoadHeader {
 
 const _: () = assert!(size_of::<LoadHeader>() == 72 && align_of::<LoadHeader>() == 8);
 
-/// Header of `keyframe`: 32 bytes, alignment 8.
+/// Header of `keyframe`: 40 bytes, alignment 8.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable, ZeroCopySend)]
 #[repr(C)]
 #[type_name("catenary.KeyframeHeader")]
@@ -107,6 +107,17 @@ pub struct KeyframeHeader {
     /// Number of outcomes of the run up to this state. Those after the snapshot's, such as that of a pause, have not
     /// changed it. 0 in a replay, where the snapshot counts all.
     pub outcome_count: u64,
+    /// Number of outcomes of the run that precede this message, or follow it at once. A node publishes a keyframe again
+    /// before the first outcome that `outcome_count` does not count. A reader that receives only that message has
+    /// joined too late for all outcomes after the state. 0 in a replay.
+    pub published_outcome_count: u64,
 }
 
-const _: () = assert!(size_of::<KeyframeHeader>() == 32 && align_of::<KeyframeHeader>() == 8);
+const _: () = assert!(size_of::<KeyframeHeader>() == 40 && align_of::<KeyframeHeader>() == 8);
+
+impl KeyframeHeader {
+    /// Returns `true` if a reader that has received this message receives every outcome after the state.
+    pub fn precedes_outcomes(&self) -> bool {
+        self.published_outcome_count <= self.outcome_count
+    }
+}

@@ -116,7 +116,10 @@ fn write_state_layouts(text: &mut String) {
     layout!(text, CollidersHeader { run_id, step, count, list_index });
     layout!(text, ForcesHeader { run_id, step, count, rate_hz });
     layout!(text, ForceRow { kind, index, impulse, angular_impulse, contacts, spare });
-    layout!(text, KeyframeHeader { run_id, step, size_bytes, outcome_count });
+    layout!(
+        text,
+        KeyframeHeader { run_id, step, size_bytes, outcome_count, published_outcome_count }
+    );
 }
 
 fn write_command_and_status_layouts(text: &mut String) {

@@ -46,7 +46,7 @@ fn publish_new_step(owner: &Owner, step: u64) {
     let tears =
         TearsHeader { run_id: RUN_ID, step, since_step: 6, new_count: 1, ..TearsHeader::default() };
     owner.publish_tears(tears, &[TornConstraint::new(7, Some(TearCause::Force))]).unwrap();
-    let keyframe = KeyframeHeader { run_id: RUN_ID, step, size_bytes: 0, outcome_count: 0 };
+    let keyframe = KeyframeHeader { run_id: RUN_ID, step, ..KeyframeHeader::default() };
     owner.publish_keyframe(keyframe, b"a keyframe longer than any of the old load").unwrap();
     publish_new_particles(owner, step);
 }

@@ -120,7 +120,7 @@ pub(crate) fn publish_everything(owner: &Owner, step: u64) {
     owner.publish_tears(tears, &[TornConstraint::new(2, Some(TearCause::Cut))]).unwrap();
     owner.publish_parameters(RUN_ID, step, &parameters(step)).unwrap();
     publish_colliders(owner, step);
-    let keyframe = KeyframeHeader { run_id: RUN_ID, step, size_bytes: 0, outcome_count: 0 };
+    let keyframe = KeyframeHeader { run_id: RUN_ID, step, ..KeyframeHeader::default() };
     owner.publish_keyframe(keyframe, b"keyframe").unwrap();
     owner.publish_status(&NodeStatus { step, ..NodeStatus::default() }).unwrap();
     publish_snapshot(owner, &SnapshotHeader { torn_count: 1, ..snapshot_header(step) });

@@ -1,7 +1,8 @@
 //! Loads after the first one, in the same run or in a new one.
 
 use sim_contract::{
-    Command, OUTCOME_FLAG_NEW_RUN, Outcome, OwnerError, ReplacedMemory, SnapshotHeader, Wake,
+    Command, KeyframeHeader, OUTCOME_FLAG_NEW_RUN, Outcome, OwnerError, ReplacedMemory,
+    SnapshotHeader, Wake,
 };
 use sim_solver::Solver;
 
@@ -72,9 +73,9 @@ impl Publisher {
     /// Begins a run, whose scene is published. Publish its step 0 next.
     pub(crate) fn begin_run(&mut self, run_id: u64, rate_hz: u32) {
         (self.run_id, self.rate_hz) = (run_id, rate_hz);
-        (self.last, self.snapshot_count, self.keyframe_step) = (SnapshotHeader::default(), 0, 0);
+        (self.last, self.keyframe) = (SnapshotHeader::default(), KeyframeHeader::default());
         (self.outcome_count, self.same_state_count, self.rejected_count) = (0, 0, 0);
-        self.keyframe_outcome_count = 0;
+        self.snapshot_count = 0;
         (self.since_step, self.included_step) = (0, 0);
         self.request_keyframe();
     }

@@ -114,7 +114,7 @@ fn header(step: u64, outcome_count: u64) -> SnapshotHeader {
 }
 
 fn keyframe_header(step: u64) -> KeyframeHeader {
-    KeyframeHeader { run_id: RUN_ID, step, size_bytes: 1, outcome_count: 0 }
+    KeyframeHeader { run_id: RUN_ID, step, size_bytes: 1, ..KeyframeHeader::default() }
 }
 
 fn keyframe(step: u64) -> Change {
@@ -203,6 +203,21 @@ fn the_recording_starts_at_the_first_state_with_a_keyframe() {
     assert_eq!(run.epoch_ns, 4_000_000_000 - 400_000_000);
     assert_eq!(names(&publish(&mut intake, header(5, 0), &[])), ["snapshot 5"]);
     assert_eq!((intake.first_step(), missing_count(&intake)), (Some(4), 0));
+}
+
+#[test]
+fn a_keyframe_that_came_after_outcomes_does_not_start_the_recording_at_its_state() {
+    let mut intake = Intake::default();
+    // The node has published outcome 2 before this recorder joined.
+    let late =
+        KeyframeHeader { outcome_count: 2, published_outcome_count: 3, ..keyframe_header(4) };
+    let changes = [Change::Load, Change::Keyframe(late, vec![1])];
+    assert!(names(&publish(&mut intake, header(4, 2), &changes)).is_empty());
+    assert!(names(&send(&mut intake, &[Update::Outcome(&outcome(3, 5))])).is_empty());
+    assert!(names(&send(&mut intake, &[Update::Keyframe(&late, &[1])])).is_empty());
+    let accepted = publish(&mut intake, header(5, 4), &[keyframe(5)]);
+    assert_eq!(names(&accepted), ["/parameters 0", "/keyframe 5", "snapshot 5"]);
+    assert_eq!((intake.first_step(), missing_count(&intake)), (Some(5), 0));
 }
 
 #[test]

@@ -42,7 +42,7 @@ impl Fixture {
     /// Shows a load of a named scene, whose step has a keyframe.
     fn begin(&mut self, name: &str, step: u64, topology_revision: u32) {
         self.owner.load(&named(name, step, topology_revision)).unwrap();
-        let header = KeyframeHeader { run_id: RUN_ID, step, size_bytes: 0, outcome_count: 0 };
+        let header = KeyframeHeader { run_id: RUN_ID, step, ..KeyframeHeader::default() };
         self.owner.publish_keyframe(header, &keyframe()).unwrap();
         self.publish_kept(step, topology_revision, step);
         self.read();
@@ -345,7 +345,7 @@ fn an_undo_that_cannot_be_exact_is_refused_with_the_cure() {
 
     // The first scene of the fixture has no name.
     let mut fixture = Fixture::start();
-    let header = KeyframeHeader { run_id: RUN_ID, step: 0, size_bytes: 0, outcome_count: 0 };
+    let header = KeyframeHeader { run_id: RUN_ID, step: 0, ..KeyframeHeader::default() };
     fixture.owner.publish_keyframe(header, &keyframe()).unwrap();
     fixture.publish(1, 0, 2);
     fixture.read();
@@ -391,7 +391,7 @@ fn a_grabbed_particle_leaves_no_grab_behind() {
     solver.apply(3, &grab).unwrap();
     solver.finish_boundary();
     solver.step();
-    let header = KeyframeHeader { run_id: RUN_ID, step: 11, size_bytes: 0, outcome_count: 0 };
+    let header = KeyframeHeader { run_id: RUN_ID, step: 11, ..KeyframeHeader::default() };
     fixture.owner.publish_keyframe(header, &solver.keyframe().encode()).unwrap();
     fixture.publish_kept(11, 1, 11);
     fixture.read();

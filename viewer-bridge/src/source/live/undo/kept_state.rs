@@ -16,9 +16,11 @@ const KEYFRAMES_MAX: usize = 8;
 pub(in crate::source::live) struct Keyframes(VecDeque<(u64, Vec<u8>)>);
 
 impl Keyframes {
-    /// Keeps the keyframe of a step.
+    /// Keeps the keyframe of a step. A node may publish it twice.
     pub(in crate::source::live) fn add(&mut self, step: u64, bytes: Vec<u8>) {
-        if self.0.len() == KEYFRAMES_MAX {
+        if self.0.back().is_some_and(|(last, _)| *last == step) {
+            self.0.pop_back();
+        } else if self.0.len() == KEYFRAMES_MAX {
             self.0.pop_front();
         }
         self.0.push_back((step, bytes));
