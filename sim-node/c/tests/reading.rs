@@ -172,6 +172,7 @@ fn a_state_arrives_with_its_keyframe_and_is_answered() {
             thread::yield_now();
         }
         let (command, state) = &states[0];
+        let state = state.as_ref().unwrap();
         assert_eq!((state.scene_hash, state.particles.as_slice()), (42, &particles[..]));
         assert_eq!(state.keyframe.as_deref(), Some(&[7, 8, 9][..]));
         let outcome = Outcome::new(0, 9, command.command, Ok(()));

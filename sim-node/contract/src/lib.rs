@@ -89,7 +89,7 @@ pub use messages::outcome::{
 };
 pub use messages::parameters::{ParameterState, ParametersHeader};
 pub use messages::ready::Ready;
-pub use messages::restore::{GivenState, ReceivedState, RestoreHeader, scene_hash};
+pub use messages::restore::{GivenState, MalformedState, ReceivedState, RestoreHeader, scene_hash};
 pub use messages::snapshot::{ParticleState, SnapshotFlags, SnapshotHeader};
 pub use messages::status::{MemberStatus, NodeStatus, StatusFlags};
 pub use messages::tears::{TearsHeader, TornConstraint};

@@ -23,7 +23,7 @@ use crate::messages::collider::{ColliderState, CollidersHeader};
 use crate::messages::command::Command;
 use crate::messages::outcome::Outcome;
 use crate::messages::ready::Ready;
-use crate::messages::restore::{ReceivedState, RestoreHeader};
+use crate::messages::restore::{MalformedState, ReceivedState, RestoreHeader};
 use crate::messages::snapshot::{ParticleState, SnapshotHeader};
 use crate::messages::status::NodeStatus;
 use crate::messages::tears::{TearsHeader, TornConstraint};
@@ -303,21 +303,18 @@ impl Owner {
         });
     }
 
-    /// Appends the states that clients have given, each with the command that its outcome answers: at most
-    /// two of each connection, and [`crate::RESTORES_MAX`] in all. A message that is longer than any state of
-    /// the load is not copied: its state has no particles. Returns the number of malformed messages.
-    pub fn receive_states(&self, states: &mut Vec<(ReceivedCommand, ReceivedState)>) -> u64 {
-        let mut refused_count = 0;
+    /// Appends the messages of clients that give a state, each with the command that its outcome answers: at most
+    /// two of each connection, and [`crate::RESTORES_MAX`] in all.
+    pub fn receive_states(
+        &self,
+        states: &mut Vec<(ReceivedCommand, Result<ReceivedState, MalformedState>)>,
+    ) {
         let size_bytes_max = self.writers.state_size_bytes_max();
         receive_held(&self.restore, RESTORES_MAX, |header, payload, connection| {
-            let command = header.command().map(|command| ReceivedCommand { command, connection });
+            let received = ReceivedCommand { command: header.command(), connection };
             let state = ReceivedState::from_message(header, payload, size_bytes_max);
-            match command.zip(state) {
-                Some(state) => states.push(state),
-                None => refused_count += 1,
-            }
+            states.push((received, state));
         });
-        refused_count
     }
 
     /// Returns the connections of members, dead ones too. Cheap.
@@ -408,6 +405,8 @@ fn wake_sender(service: &Events) -> Result<WakeSender, ServiceError> {
 mod tests {
     use std::time::Duration;
 
+    use sim_types::Action;
+
     use super::*;
     use crate::client::Client;
     use crate::limits::OWNER_PUBLISHERS_MAX;
@@ -485,5 +484,41 @@ mod tests {
             let mut causes = std::iter::repeat_with(|| listener.wait(DEADLINE)).take(2);
             assert!(causes.any(|cause| cause == WakeCause::OwnerGone));
         }
+    }
+
+    #[test]
+    fn a_malformed_state_comes_with_its_command_and_its_fault() {
+        let domain = TestDomain::new();
+        let owner = Owner::create(&domain.endpoint(), &load(0)).unwrap();
+        let session = Session::join(&domain.endpoint()).unwrap();
+        let service: Slices<u8, RestoreHeader> = session.slices(&RESTORE, Access::Open).unwrap();
+        let stranger = service.publisher_builder().initial_max_slice_len(40).create().unwrap();
+        let give = |header: RestoreHeader| {
+            let mut sample = stranger.loan_slice(33).unwrap();
+            *sample.user_header_mut() = RestoreHeader { client_id: 7, sequence: 3, ..header };
+            sample.send().unwrap();
+            let mut states = Vec::new();
+            owner.receive_states(&mut states);
+            let (received, state) = states.pop().unwrap();
+            assert_eq!((received.command.client_id, received.command.sequence), (7, 3));
+            assert!(matches!(received.command.action(), Action::Restore { .. }));
+            state.unwrap_err()
+        };
+        let fitting = RestoreHeader { size_bytes: 33, contents: 1, ..RestoreHeader::default() };
+        let found = [
+            give(RestoreHeader { size_bytes: 40, ..fitting }),
+            give(RestoreHeader { contents: 9, ..fitting }),
+            give(RestoreHeader { particle_count: 2, ..fitting }),
+            give(RestoreHeader { contents: 2, ..fitting }),
+            give(fitting),
+        ];
+        let expected = [
+            MalformedState::Length { named: 40, found: 33 },
+            MalformedState::Contents { contents: 9 },
+            MalformedState::Particles { particle_count: 2, size_bytes: 33 },
+            MalformedState::Rest { size_bytes: 33 },
+            MalformedState::TooLong { size_bytes: 33, max: 8 },
+        ];
+        assert_eq!(found, expected);
     }
 }

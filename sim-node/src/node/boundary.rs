@@ -9,7 +9,7 @@ use sim_contract::{
 use sim_solver::{Applied, Control, Keyframe, Particle};
 
 use super::history::Target;
-use super::inbox::Request;
+use super::inbox::{Given, Request};
 use super::job::Done;
 use super::{Boundary, Node};
 
@@ -149,19 +149,21 @@ impl Node {
     /// Puts a given state in place. Its hash replaces that of the command.
     fn restore(
         &mut self,
-        state: Option<&ReceivedState>,
+        given: Option<&Given>,
         command: &mut Command,
     ) -> Result<Applied, Reason> {
         // A command without a state has come through the wrong service.
-        let state = state.ok_or(Reason::NoEffectHere)?;
+        let given = given.ok_or(Reason::NoEffectHere)?;
+        let state = given.as_ref().map_err(|malformed| format!("the message is malformed: {malformed}"));
+        let result = state.and_then(|state| self.put_in_place(state).map(|()| state));
+        let state = result.map_err(|problem| {
+            self.warnings.print(&format!("restore: {problem}"));
+            Reason::InvalidState
+        })?;
         let contents = match &state.keyframe {
             Some(_) => RestoreContents::State,
             None => RestoreContents::Motion,
         };
-        self.put_in_place(state).map_err(|problem| {
-            self.warnings.print(&format!("restore: {problem}"));
-            Reason::InvalidState
-        })?;
         self.show_state_in_place();
         let action = Action::Restore { contents, state_hash: self.solver.hash_in_place() };
         *command = Command::new(command.client_id, command.sequence, action);

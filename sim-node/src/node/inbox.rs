@@ -3,13 +3,18 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
-use sim_contract::{Action, COMMANDS_PER_STEP_MAX, RESTORES_MAX, ReceivedCommand, ReceivedState};
+use sim_contract::{
+    Action, COMMANDS_PER_STEP_MAX, MalformedState, RESTORES_MAX, ReceivedCommand, ReceivedState,
+};
+
+/// A state that a client has given.
+pub(super) type Given = Result<ReceivedState, MalformedState>;
 
 /// A command that waits, with the state that a restore puts in place.
 #[derive(Debug, Clone)]
 pub(super) struct Request {
     pub(super) received: ReceivedCommand,
-    pub(super) state: Option<Rc<ReceivedState>>,
+    pub(super) state: Option<Rc<Given>>,
     /// Number of requests that arrived before.
     arrived_before: u64,
 }
@@ -69,14 +74,14 @@ impl Inbox {
     /// Adds states in their order of arrival.
     pub(super) fn add_states(
         &mut self,
-        states: impl IntoIterator<Item = (ReceivedCommand, ReceivedState)>,
+        states: impl IntoIterator<Item = (ReceivedCommand, Given)>,
     ) {
         for (received, state) in states {
             self.add_request(&received, Some(Rc::new(state)));
         }
     }
 
-    fn add_request(&mut self, received: &ReceivedCommand, state: Option<Rc<ReceivedState>>) {
+    fn add_request(&mut self, received: &ReceivedCommand, state: Option<Rc<Given>>) {
         let arrived_before = self.arrived_count;
         self.arrived_count += 1;
         self.put_back(Request { received: *received, state, arrived_before });
@@ -268,7 +273,8 @@ mod tests {
             let action = Action::Restore { contents: RestoreContents::Motion, state_hash: 0 };
             let command = Command::new(1, sequence, action);
             let received = ReceivedCommand { command, connection: ConnectionId::default() };
-            (received, ReceivedState { scene_hash: 0, particles: Vec::new(), keyframe: None })
+            let state = ReceivedState { scene_hash: 0, particles: Vec::new(), keyframe: None };
+            (received, Ok(state))
         };
         let mut inbox = Inbox::default();
         inbox.add([pin(1, 1), pin(1, 4)]);

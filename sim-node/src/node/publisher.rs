@@ -13,11 +13,12 @@ use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{
     CONTRACT_VERSION, CollidersHeader, Command, ConnectionId, Endpoint, ForcesHeader,
     KeyframeHeader, LoadPreparer, OUTCOME_FLAG_DISCONNECTED, Outcome, Owner, OwnerError,
-    ParameterValues, ParticleState, Ready, Reason, ReceivedCommand, ReceivedState, SnapshotFlags,
-    SnapshotHeader, TearsHeader, TornConstraint, Wake,
+    ParameterValues, ParticleState, Ready, Reason, ReceivedCommand, SnapshotFlags, SnapshotHeader,
+    TearsHeader, TornConstraint, Wake,
 };
 use sim_solver::{Applied, PlacedCollider, SOLVER_VERSION, Scene, Solver};
 
+use super::inbox::Given;
 use super::statistics::phases::{Phase, Phases};
 use forces::ForcesPublisher;
 pub(super) use load::LoadMessages;
@@ -155,10 +156,10 @@ impl Publisher {
         self.owner.receive_commands(commands);
     }
 
-    /// Returns the states that have arrived.
-    pub(crate) fn receive_states(&mut self) -> Vec<(ReceivedCommand, ReceivedState)> {
+    /// Same as [`Owner::receive_states`].
+    pub(crate) fn receive_states(&self) -> Vec<(ReceivedCommand, Given)> {
         let mut states = Vec::new();
-        self.rejected_count += self.owner.receive_states(&mut states);
+        self.owner.receive_states(&mut states);
         states
     }
 

@@ -3,6 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 use sim_types::RestoreContents;
+use thiserror::Error;
 use xxhash_rust::xxh3::xxh3_64;
 
 use crate::messages::command::Command;
@@ -80,9 +81,51 @@ impl GivenState<'_> {
     }
 }
 
+/// Why the message of a state cannot be read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum MalformedState {
+    /// The header names another length than the payload has.
+    #[error("its header names {named} bytes, but it has {found}")]
+    Length {
+        /// [`RestoreHeader::size_bytes`].
+        named: u64,
+        /// Length of the payload.
+        found: usize,
+    },
+    /// The contents have an unknown number.
+    #[error("its contents are {contents} (allowed: 1 for a state, 2 for positions and velocities)")]
+    Contents {
+        /// [`RestoreHeader::contents`].
+        contents: u32,
+    },
+    /// The payload is shorter than its particles.
+    #[error("{particle_count} particles do not fit into its {size_bytes} bytes")]
+    Particles {
+        /// [`RestoreHeader::particle_count`].
+        particle_count: u32,
+        /// Length of the payload.
+        size_bytes: usize,
+    },
+    /// Bytes follow the particles of a message without a keyframe.
+    #[error("{size_bytes} bytes follow its particles, although it has no keyframe")]
+    Rest {
+        /// Number of these bytes.
+        size_bytes: usize,
+    },
+    /// The message is longer than any state of the load.
+    #[error("it has {size_bytes} bytes, but a state of this scene has at most {max}")]
+    TooLong {
+        /// Length of the payload.
+        size_bytes: usize,
+        /// Length of the longest state.
+        max: usize,
+    },
+}
+
 /// A state as the owner of the name has received it. A foreign process may have written it, so only its
 /// lengths are checked.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ReceivedState {
     /// Same as in [`RestoreHeader`].
     pub scene_hash: u64,
@@ -93,41 +136,45 @@ pub struct ReceivedState {
 }
 
 impl ReceivedState {
-    /// Copies a message, unless it is longer than `size_bytes_max`. Returns `None` if its header and its
-    /// length contradict each other.
+    /// Copies a message. One that cannot be read, or is longer than `size_bytes_max`, is not copied.
     pub(crate) fn from_message(
         header: &RestoreHeader,
         payload: &[u8],
         size_bytes_max: usize,
-    ) -> Option<Self> {
-        if header.size_bytes != payload.len() as u64 {
-            return None;
+    ) -> Result<Self, MalformedState> {
+        let RestoreHeader { scene_hash, size_bytes: named, particle_count, contents, .. } = *header;
+        let size_bytes = payload.len();
+        if named != size_bytes as u64 {
+            return Err(MalformedState::Length { named, found: size_bytes });
         }
-        let contents = RestoreContents::from_number(header.contents)?;
-        let particle_count = usize::try_from(header.particle_count).ok()?;
-        let particles_size_bytes = particle_count.checked_mul(size_of::<ParticleState>())?;
-        let (particles, keyframe) = payload.split_at_checked(particles_size_bytes)?;
-        let is_copied = payload.len() <= size_bytes_max;
-        let (particles, keyframe) =
-            if is_copied { (particles, keyframe) } else { (&[][..], &[][..]) };
-        let keyframe = match contents {
-            RestoreContents::State => Some(keyframe.to_vec()),
-            RestoreContents::Motion if keyframe.is_empty() => None,
-            RestoreContents::Motion => return None,
-        };
+        let contents =
+            RestoreContents::from_number(contents).ok_or(MalformedState::Contents { contents })?;
+        let (particles, rest) = usize::try_from(particle_count)
+            .ok()
+            .and_then(|count| count.checked_mul(size_of::<ParticleState>()))
+            .and_then(|length| payload.split_at_checked(length))
+            .ok_or(MalformedState::Particles { particle_count, size_bytes })?;
+        if contents == RestoreContents::Motion && !rest.is_empty() {
+            return Err(MalformedState::Rest { size_bytes: rest.len() });
+        }
+        if size_bytes > size_bytes_max {
+            return Err(MalformedState::TooLong { size_bytes, max: size_bytes_max });
+        }
         // The payload has no alignment.
         let chunks = particles.chunks_exact(size_of::<ParticleState>());
         let particles = chunks.map(bytemuck::pod_read_unaligned).collect();
-        Some(Self { scene_hash: header.scene_hash, particles, keyframe })
+        let keyframe = (contents == RestoreContents::State).then(|| rest.to_vec());
+        Ok(Self { scene_hash, particles, keyframe })
     }
 }
 
 impl RestoreHeader {
-    /// Returns the command that the outcome answers.
-    pub(crate) fn command(&self) -> Option<Command> {
-        let contents = RestoreContents::from_number(self.contents)?;
+    /// Returns the command that the outcome answers. Unknown contents count as a state.
+    pub(crate) fn command(&self) -> Command {
+        let contents = RestoreContents::from_number(self.contents);
+        let contents = contents.unwrap_or(RestoreContents::State);
         let action = Action::Restore { contents, state_hash: 0 };
-        Some(Command::new(self.client_id, self.sequence, action))
+        Command::new(self.client_id, self.sequence, action)
     }
 }
 
@@ -153,17 +200,26 @@ mod tests {
         payload.extend([7, 8]);
         let complete = read(header(RestoreContents::State, 1), &payload).unwrap();
         assert_eq!((complete.particles, complete.keyframe), (vec![state], Some(vec![7, 8])));
-        let wrong_length = header(RestoreContents::State, 1);
-        assert!(ReceivedState::from_message(&wrong_length, &payload, 34).is_none());
-        assert!(read(header(RestoreContents::Motion, 1), &payload).is_none());
-        assert!(read(header(RestoreContents::State, 2), &payload).is_none());
-        assert!(
-            read(RestoreHeader { contents: 3, ..header(RestoreContents::State, 1) }, &payload)
-                .is_none()
+        let error = |header, payload: &[u8]| read(header, payload).unwrap_err().to_string();
+        let unnamed = header(RestoreContents::State, 1);
+        assert_eq!(
+            ReceivedState::from_message(&unnamed, &payload, 34),
+            Err(MalformedState::Length { named: 0, found: 34 })
         );
-        // Too long for this load.
+        assert_eq!(
+            error(header(RestoreContents::Motion, 1), &payload),
+            "2 bytes follow its particles, although it has no keyframe"
+        );
+        assert_eq!(
+            error(header(RestoreContents::State, 2), &payload),
+            "2 particles do not fit into its 34 bytes"
+        );
+        let unknown = RestoreHeader { contents: 3, ..header(RestoreContents::State, 1) };
+        assert_eq!(read(unknown, &payload), Err(MalformedState::Contents { contents: 3 }));
         payload.push(9);
-        let long = read(header(RestoreContents::State, 1), &payload).unwrap();
-        assert_eq!((long.particles, long.keyframe), (vec![], Some(vec![])));
+        assert_eq!(
+            error(header(RestoreContents::State, 1), &payload),
+            "it has 35 bytes, but a state of this scene has at most 34"
+        );
     }
 }

@@ -49,15 +49,7 @@ impl Solver {
     ) -> Result<(), RestoreError> {
         self.check_state(particles, keyframe)?;
         self.reset();
-        for (index, particle) in particles.iter().enumerate() {
-            self.particles.states[index] = *particle;
-            if particle.inverse_mass != 0.0 {
-                self.particles.base_inverse_masses[index] = particle.inverse_mass;
-            }
-        }
-        for one in &keyframe.fixed {
-            self.particles.base_inverse_masses[one.particle as usize] = one.base_inverse_mass;
-        }
+        self.particles.states.copy_from_slice(particles);
         let frozen = particles.iter().filter(|one| one.flags & ParticleFlags::FROZEN != 0);
         self.frozen_count = frozen.count() as u64;
         self.grabs.extend_from_slice(&keyframe.grabs);

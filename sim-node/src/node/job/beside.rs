@@ -105,7 +105,7 @@ impl Node {
                 self.solver.plan_state(&state.keyframe())
             }
             Action::Restore { .. } => {
-                let state = first.state.as_ref()?;
+                let state = first.state.as_deref()?.as_ref().ok()?;
                 let is_own = state.scene_hash == self.publisher.scene_hash();
                 let bytes = state.keyframe.as_ref().filter(|_| is_own)?;
                 self.solver.plan_state(&Keyframe::decode(bytes).ok()?)

@@ -25,7 +25,7 @@ impl Solver {
             self.check_particle(particle, state)
                 .map_err(|what| RestoreError::Particle { particle, what })?;
         }
-        check_holds(particles, keyframe)
+        self.check_holds(particles, keyframe)
             .and_then(|()| self.check_keyframe(keyframe))
             .map_err(|what| RestoreError::Mismatch { what })
     }
@@ -47,11 +47,16 @@ impl Solver {
             return Err("its flags and its inverse mass contradict each other");
         }
         self.check_place(particle, particle.flags)?;
-        if is_fixed || is_inverse_mass(particle.inverse_mass) {
+        if is_fixed || self.has_mass(index, particle.inverse_mass) {
             Ok(())
         } else {
-            Err("its inverse mass is not a positive number")
+            Err("its mass is not the one in the scene")
         }
+    }
+
+    /// Returns true if a free particle has this inverse mass in the scene, which no command changes.
+    fn has_mass(&self, particle: usize, inverse_mass: f32) -> bool {
+        self.particles.base_inverse_masses[particle].to_bits() == inverse_mass.to_bits()
     }
 
     fn check_count(&self, particles: &[Particle]) -> Result<(), RestoreError> {
@@ -152,40 +157,38 @@ impl Solver {
         }
         Ok(())
     }
+
+    /// Checks that the snapshot and the keyframe agree on fixed and grabbed particles.
+    fn check_holds(&self, particles: &[Particle], keyframe: &Keyframe) -> Result<(), &'static str> {
+        let with = |flags: u32| {
+            let indices = (0_u32..).zip(particles);
+            indices.filter(move |(_, one)| one.flags & flags != 0).map(|(index, _)| index)
+        };
+        if !with(ParticleFlags::ALL).eq(keyframe.fixed.iter().map(|one| one.particle)) {
+            return Err("their fixed particles differ");
+        }
+        if !with(ParticleFlags::GRABBED).eq(keyframe.grabs.iter().map(|grab| grab.particle)) {
+            return Err("their grabbed particles differ");
+        }
+        // The position of a root is taken from the snapshot, so it must not depend on the step.
+        let is_root =
+            |root: &u32| particles.get(*root as usize).is_some_and(|one| is_root(one.flags));
+        if !keyframe.tethers.roots.iter().all(is_root) {
+            return Err("a root of its tethers is not fixed");
+        }
+        let mut fixed = keyframe.fixed.iter();
+        if !fixed.all(|one| self.has_mass(one.particle as usize, one.base_inverse_mass)) {
+            return Err("the mass of a fixed particle is not the one in the scene");
+        }
+        if !keyframe.grabs.iter().all(|grab| is_near(&grab.target)) {
+            return Err("a target is out of range");
+        }
+        Ok(())
+    }
 }
 
 /// True if the indices ascend strictly, all below a limit.
 fn is_ascending_below(indices: &[u32], limit: usize) -> bool {
     indices.windows(2).all(|pair| pair[0] < pair[1])
         && indices.last().is_none_or(|last| (*last as usize) < limit)
-}
-
-fn is_inverse_mass(number: f32) -> bool {
-    number.is_finite() && number > 0.0
-}
-
-/// Checks that the snapshot and the keyframe agree on fixed and grabbed particles.
-fn check_holds(particles: &[Particle], keyframe: &Keyframe) -> Result<(), &'static str> {
-    let with = |flags: u32| {
-        let indices = (0_u32..).zip(particles);
-        indices.filter(move |(_, one)| one.flags & flags != 0).map(|(index, _)| index)
-    };
-    if !with(ParticleFlags::ALL).eq(keyframe.fixed.iter().map(|one| one.particle)) {
-        return Err("their fixed particles differ");
-    }
-    if !with(ParticleFlags::GRABBED).eq(keyframe.grabs.iter().map(|grab| grab.particle)) {
-        return Err("their grabbed particles differ");
-    }
-    // The position of a root is taken from the snapshot, so it must not depend on the step.
-    let is_root = |root: &u32| particles.get(*root as usize).is_some_and(|one| is_root(one.flags));
-    if !keyframe.tethers.roots.iter().all(is_root) {
-        return Err("a root of its tethers is not fixed");
-    }
-    if !keyframe.fixed.iter().all(|one| is_inverse_mass(one.base_inverse_mass)) {
-        return Err("a mass is not a positive number");
-    }
-    if !keyframe.grabs.iter().all(|grab| is_near(&grab.target)) {
-        return Err("a target is out of range");
-    }
-    Ok(())
 }

@@ -105,13 +105,13 @@ impl Fixture {
     /// The state that the bridge gives to the node. It is applied.
     fn given_state(&mut self, step: u64) -> ReceivedState {
         let mut states = Vec::new();
-        assert_eq!(self.owner.receive_states(&mut states), 0);
+        self.owner.receive_states(&mut states);
         assert_eq!(states.len(), 1);
         let (received, state) = states.pop().unwrap();
         let Sent { client_id, sequence, .. } = received.command;
         let action = Action::Restore { contents: RestoreContents::State, state_hash: 5 };
         self.outcome(step, Sent::new(client_id, sequence, action), Ok(()));
-        state
+        state.unwrap()
     }
 
     /// The answer to the last undo.
