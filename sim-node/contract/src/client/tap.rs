@@ -30,7 +30,6 @@ use crate::ports::service::{
     ServiceError, TEARS, TOPOLOGY,
 };
 use crate::ports::services::{AttachError, Attachment};
-use crate::ports::source::Source;
 use crate::ports::wake::WakeListener;
 
 /// Most reads of every service for one state. Each read receives at most one buffer.
@@ -142,7 +141,7 @@ impl Tap {
 
     fn subscribe(attachment: Attachment, member: Option<Member>) -> Result<Self, ServiceError> {
         let attachment = Arc::new(attachment);
-        let (services, source) = (&attachment.services, &Arc::new(Source::new(&attachment.status)));
+        let (services, source) = (&attachment.services, &attachment.source());
         // Fields are evaluated in the order written here.
         let tap = Self {
             listener: listen(&services.wake)?,
@@ -181,7 +180,7 @@ impl Tap {
     ///
     /// [`Change::Forces`]: crate::Change::Forces
     pub fn read_forces(&mut self) -> Result<(), ServiceError> {
-        let source = Arc::new(Source::new(&self.attachment.status));
+        let source = self.attachment.source();
         let reader = SliceReader::create(&self.attachment.services.forces, &FORCES)?;
         self.forces = Some(reader.restricted_to(&source));
         Ok(())
@@ -374,9 +373,13 @@ impl Tap {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
     use crate::owner::Owner;
     use crate::owner::load::Load;
+    use crate::ports::domain;
+    use crate::ports::domain::owner_lock::OwnerLock;
     use crate::ports::session::{Access, Session, Slices};
     use crate::testing::TestDomain;
 
@@ -421,6 +424,31 @@ mod tests {
         publish(&owner, 7, 2);
         assert_eq!(read_all(&mut tap), [(7, 1), (7, 2)]);
         assert_eq!(tap.drain_errors(), []);
+    }
+
+    #[test]
+    fn messages_of_a_process_that_calls_itself_the_owner_without_its_lock_are_ignored() {
+        let domain = TestDomain::new();
+        let owner = create_owner(&domain.endpoint(), 7);
+        owner.refresh();
+        // The lock then names another process than the one that publishes.
+        let config = domain::configuration(Some(domain.name())).unwrap();
+        let rename = |process_id: u32| {
+            for path in OwnerLock::paths(&config, domain.endpoint().name()) {
+                fs::write(path, format!("{process_id}\n")).unwrap();
+            }
+        };
+        let mut tap = Tap::attach(&domain.endpoint()).unwrap();
+        let attachment = Attachment::to(&domain.endpoint()).unwrap();
+        rename(1);
+        let mut other = Tap::subscribe(attachment, None).unwrap();
+        owner.refresh();
+        publish(&owner, 7, 1);
+        assert_eq!((read_all(&mut tap), read_all(&mut other)), (vec![(7, 1)], vec![]));
+        let error = Tap::attach(&domain.endpoint()).unwrap_err();
+        assert!(matches!(error, AttachError::NoServices { process_id: Some(1), .. }), "{error}");
+        rename(std::process::id());
+        assert!(Tap::attach(&domain.endpoint()).is_ok());
     }
 
     #[test]

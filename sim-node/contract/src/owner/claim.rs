@@ -10,8 +10,9 @@ use crate::ports::domain::owner_lock::{LockError, OwnerLock};
 use crate::ports::domain::root::RootError;
 use crate::ports::domain::{self, orphans, root, unfinished};
 use crate::ports::service::{OWNER_PORT, STATUS, ServiceError};
-use crate::ports::services::owner;
+use crate::ports::services::{OwnerProcess, living_process};
 use crate::ports::session::{Session, Values};
+use crate::ports::source::claiming_nodes;
 use crate::ports::writer::ValueWriter;
 
 /// Most attempts to take the lock of a name, in half a second: an owner that ends frees it a moment
@@ -74,6 +75,11 @@ pub(super) fn claim_name(
             status => return Ok(status?),
         }
     }
+}
+
+/// Returns the living process that calls itself the owner.
+fn owner(status: &Values<NodeStatus>) -> Option<OwnerProcess> {
+    living_process(status, &claiming_nodes(status))
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use iceoryx2::identifiers::UniqueNodeId;
 use iceoryx2::node::NodeView;
 use iceoryx2::prelude::{CallbackProgression, Config, NodeState, PortFactory};
 use sim_types::CLIENT_ID_END;
@@ -28,7 +29,7 @@ use crate::ports::service::{
     SCENE, STATUS, SURFACE, ServiceError, TEARS, TOPOLOGY,
 };
 use crate::ports::session::{Access, Events, Session, Slices, Values};
-use crate::ports::source::{is_mirror, owner_nodes};
+use crate::ports::source::{Source, is_mirror, owner_nodes};
 
 /// The services of a name, except `status`.
 #[derive(Debug)]
@@ -167,30 +168,32 @@ pub enum AttachError {
     },
 }
 
-/// The living process that owns a name.
+/// A living process that owns a name, or calls itself its owner.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct OwnerProcess {
     /// Its process id, if iceoryx2 knows it.
     pub(crate) id: Option<u32>,
 }
 
-/// Returns the living process of this host that owns the name.
-pub(crate) fn owner(status: &Values<NodeStatus>) -> Option<OwnerProcess> {
-    let owner_nodes = owner_nodes(status);
-    let mut owner = None;
-    if owner_nodes.is_empty() {
-        return owner;
+/// Returns the living process of one of these iceoryx2 nodes, which have publishers of `status`.
+pub(crate) fn living_process(
+    status: &Values<NodeStatus>,
+    nodes: &[UniqueNodeId],
+) -> Option<OwnerProcess> {
+    let mut process = None;
+    if nodes.is_empty() {
+        return process;
     }
     let listed = status.nodes(|node| match node {
-        NodeState::Alive(node) if owner_nodes.contains(node.id()) => {
+        NodeState::Alive(node) if nodes.contains(node.id()) => {
             let id = node.details().as_ref().map(|details| details.process_id().value());
-            owner = Some(OwnerProcess { id: id.and_then(|id| u32::try_from(id).ok()) });
+            process = Some(OwnerProcess { id: id.and_then(|id| u32::try_from(id).ok()) });
             CallbackProgression::Stop
         }
         _ => CallbackProgression::Continue,
     });
-    // If iceoryx2 cannot list the nodes, the owner counts as alive.
-    if listed.is_err() { Some(OwnerProcess { id: None }) } else { owner }
+    // If iceoryx2 cannot list the nodes, the process counts as alive.
+    if listed.is_err() { Some(OwnerProcess { id: None }) } else { process }
 }
 
 /// A connection to the services of a simulation that another process owns.
@@ -228,9 +231,9 @@ impl Attachment {
             }
             result => Arc::new(result?),
         };
-        let is_mirror = is_mirror(&status);
+        let (is_mirror, lock) = (is_mirror(&status), session.lock_place());
         for _ in 0..ATTEMPTS_MAX {
-            if !is_mirror && owner(&status).is_none() {
+            if !is_mirror && living_process(&status, &owner_nodes(&status, &lock)).is_none() {
                 break;
             }
             match Services::access(&session, Access::Open) {
@@ -271,7 +274,13 @@ impl Attachment {
         if let Some(mirror) = &self.mirror {
             return mirror.is_owner_alive().then_some(OwnerProcess { id: None });
         }
-        owner(&self.status).or_else(|| self.unlisted_owner())
+        let nodes = owner_nodes(&self.status, &self.session.lock_place());
+        living_process(&self.status, &nodes).or_else(|| self.unlisted_owner(&nodes))
+    }
+
+    /// Returns the processes whose messages count.
+    pub(crate) fn source(&self) -> Arc<Source> {
+        Arc::new(Source::new(&self.status, self.session.lock_place()))
     }
 
     /// Returns `true` if the owner is on another host, behind a tunnel.
@@ -288,8 +297,8 @@ impl Attachment {
 
     /// Returns an owner that iceoryx2 takes for dead, because a cleaner of `/tmp` has removed the files of
     /// its node. It still holds the lock of the name.
-    fn unlisted_owner(&self) -> Option<OwnerProcess> {
-        let has_publisher = !owner_nodes(&self.status).is_empty();
+    fn unlisted_owner(&self, nodes: &[UniqueNodeId]) -> Option<OwnerProcess> {
+        let has_publisher = !nodes.is_empty();
         has_publisher.then(|| self.session.lock_holder()).flatten().map(|id| OwnerProcess { id })
     }
 }

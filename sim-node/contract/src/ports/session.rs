@@ -16,7 +16,7 @@ use crate::endpoint::Endpoint;
 use crate::limits::{CONTRACT_VERSION, PARTICIPANTS_MAX};
 use crate::ports::cleanup;
 use crate::ports::domain::orphans::{self, Port};
-use crate::ports::domain::owner_lock::OwnerLock;
+use crate::ports::domain::owner_lock::{LockPlace, OwnerLock};
 use crate::ports::domain::{self, counter, root, unfinished};
 use crate::ports::memory;
 use crate::ports::service::{Cause, ServiceError, ServiceSpec, VERSION_KEY, WAKE, WhenFull};
@@ -151,7 +151,12 @@ impl Session {
     /// Returns the process that holds the lock of the name: its id, if its file tells.
     #[allow(clippy::option_option, reason = "the id of a holder may be unknown")]
     pub(crate) fn lock_holder(&self) -> Option<Option<u32>> {
-        OwnerLock::holder(self.node.config(), self.endpoint.name())
+        self.lock_place().holder()
+    }
+
+    /// Returns where the lock of the name is.
+    pub(crate) fn lock_place(&self) -> LockPlace {
+        LockPlace::new(self.node.config(), self.endpoint.name())
     }
 
     /// Returns `true` if a killed owner has left the lock of the name.

@@ -4,60 +4,86 @@ use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use iceoryx2::identifiers::UniqueNodeId;
-use iceoryx2::prelude::{CallbackProgression, PortFactory};
+use iceoryx2::prelude::{CallbackProgression, PortFactory, ipc_threadsafe};
 
 use crate::messages::status::NodeStatus;
+use crate::ports::domain::owner_lock::LockPlace;
 use crate::ports::service::OWNER_PORT;
 use crate::ports::session::{Values, version_of};
 
-/// Most owners to remember: the present one, and earlier ones with unread messages.
-const OWNERS_MAX: usize = 8;
+/// Most processes to remember: the present owner, earlier ones with unread messages, and processes that are none.
+const REMEMBERED_MAX: usize = 8;
 
 /// Accepts the messages of the owner of a name, and refuses those of every other process.
 ///
 /// A service has room for more publishers than the owner needs, and iceoryx2 lets any process publish.
-/// The owner has a publisher of `status` with a name of its own; at the far end of a tunnel, the tunnel
-/// stands for it. Messages of an earlier owner may still be unread when another one has taken the name, so
-/// it is remembered.
+/// The owner has a publisher of `status` with a name of its own, and is the process that holds the lock; at the far
+/// end of a tunnel, the tunnel stands for it. Messages of an earlier owner may still be unread when another one has
+/// taken the name, so it is remembered.
 #[derive(Debug)]
 pub(crate) struct Source {
     status: Arc<Values<NodeStatus>>,
+    lock: LockPlace,
     /// Newest last.
-    owners: Mutex<VecDeque<UniqueNodeId>>,
+    remembered: Mutex<VecDeque<Remembered>>,
+}
+
+/// An iceoryx2 node with a publisher that is named as an owner's.
+#[derive(Debug, Clone, Copy)]
+struct Remembered {
+    node: UniqueNodeId,
+    is_owner: bool,
 }
 
 impl Source {
     /// Accepts the present owner, even if it is gone when its messages are read, and later owners.
-    pub(crate) fn new(status: &Arc<Values<NodeStatus>>) -> Self {
-        let source = Self { status: Arc::clone(status), owners: Mutex::default() };
-        source.remember_owner();
+    pub(crate) fn new(status: &Arc<Values<NodeStatus>>, lock: LockPlace) -> Self {
+        let source = Self { status: Arc::clone(status), lock, remembered: Mutex::default() };
+        source.remember_new();
         source
     }
 
     /// Returns `true` if a message of this iceoryx2 node comes from an owner of the name.
     pub(crate) fn accepts(&self, node: UniqueNodeId) -> bool {
-        if !self.owners().contains(&node) {
-            self.remember_owner();
-        }
-        self.owners().contains(&node)
+        self.find(node).unwrap_or_else(|| {
+            self.remember_new();
+            self.find(node).unwrap_or(false)
+        })
     }
 
-    fn owners(&self) -> MutexGuard<'_, VecDeque<UniqueNodeId>> {
+    fn find(&self, node: UniqueNodeId) -> Option<bool> {
+        self.remembered().iter().find(|one| one.node == node).map(|one| one.is_owner)
+    }
+
+    fn remembered(&self) -> MutexGuard<'_, VecDeque<Remembered>> {
         // A list of ids is valid after any panic.
-        self.owners.lock().unwrap_or_else(PoisonError::into_inner)
+        self.remembered.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn remember_owner(&self) {
-        let mut owners = self.owners();
-        for node in source_nodes(&self.status) {
-            if !owners.contains(&node) {
-                owners.push_back(node);
+    /// Remembers the nodes that have come since. Only then it reads the lock.
+    fn remember_new(&self) {
+        let is_mirror = is_mirror(&self.status);
+        let nodes =
+            if is_mirror { publisher_nodes(&self.status) } else { claiming_nodes(&self.status) };
+        let mut remembered = self.remembered();
+        for node in nodes {
+            if remembered.iter().all(|one| one.node != node) {
+                let is_owner = is_mirror || is_holder(node, &self.lock);
+                remembered.push_back(Remembered { node, is_owner });
             }
         }
-        while owners.len() > OWNERS_MAX {
-            owners.pop_front();
+        while remembered.len() > REMEMBERED_MAX {
+            remembered.pop_front();
         }
     }
+}
+
+/// Returns `true` if the process of an iceoryx2 node holds the lock of the name. A process in a container may own the
+/// name through a lock that is not visible here, so a lock without a holder speaks against nobody.
+fn is_holder(node: UniqueNodeId, lock: &LockPlace) -> bool {
+    let Some(Some(holder)) = lock.holder() else { return true };
+    let process = node.pid::<ipc_threadsafe::Service>();
+    process.is_ok_and(|process| i64::from(process.value()) == i64::from(holder))
 }
 
 /// Returns `true` if a tunnel has created the service.
@@ -65,9 +91,9 @@ pub(crate) fn is_mirror(service: &Values<NodeStatus>) -> bool {
     version_of(service.attributes()).is_none()
 }
 
-/// Returns the iceoryx2 nodes of the owners of the name, living or dead: the publishers of `status` that are
+/// Returns the iceoryx2 nodes, living or dead, that call themselves the owner: the publishers of `status` that are
 /// named as an owner's. A tunnel has one without that name.
-pub(crate) fn owner_nodes(status: &Values<NodeStatus>) -> Vec<UniqueNodeId> {
+pub(crate) fn claiming_nodes(status: &Values<NodeStatus>) -> Vec<UniqueNodeId> {
     let mut nodes = Vec::new();
     status.dynamic_config().list_publishers(|publisher| {
         if publisher.publisher_name.as_str() == OWNER_PORT {
@@ -78,7 +104,14 @@ pub(crate) fn owner_nodes(status: &Values<NodeStatus>) -> Vec<UniqueNodeId> {
     nodes
 }
 
-/// Returns the iceoryx2 nodes of all publishers of `status`.
+/// Returns the iceoryx2 nodes of the owners of the name, living or dead.
+pub(crate) fn owner_nodes(status: &Values<NodeStatus>, lock: &LockPlace) -> Vec<UniqueNodeId> {
+    let mut nodes = claiming_nodes(status);
+    nodes.retain(|node| is_holder(*node, lock));
+    nodes
+}
+
+/// Returns the iceoryx2 nodes of all publishers of `status`. Those of a mirror are the tunnel's.
 fn publisher_nodes(status: &Values<NodeStatus>) -> Vec<UniqueNodeId> {
     let mut nodes = Vec::new();
     status.dynamic_config().list_publishers(|publisher| {
@@ -86,9 +119,4 @@ fn publisher_nodes(status: &Values<NodeStatus>) -> Vec<UniqueNodeId> {
         CallbackProgression::Continue
     });
     nodes
-}
-
-/// Returns the iceoryx2 nodes whose messages are those of the owner: of a mirror, the tunnel's.
-fn source_nodes(status: &Values<NodeStatus>) -> Vec<UniqueNodeId> {
-    if is_mirror(status) { publisher_nodes(status) } else { owner_nodes(status) }
 }

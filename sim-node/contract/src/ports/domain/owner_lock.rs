@@ -32,6 +32,25 @@ pub(crate) enum LockError {
     System { path: PathBuf, error: io::Error },
 }
 
+/// Where the lock of a name is.
+#[derive(Debug, Clone)]
+pub(crate) struct LockPlace {
+    config: Config,
+    name: String,
+}
+
+impl LockPlace {
+    pub(crate) fn new(config: &Config, name: &str) -> Self {
+        Self { config: config.clone(), name: name.to_owned() }
+    }
+
+    /// Same as [`OwnerLock::holder`].
+    #[allow(clippy::option_option, reason = "as there")]
+    pub(crate) fn holder(&self) -> Option<Option<u32>> {
+        OwnerLock::holder(&self.config, &self.name)
+    }
+}
+
 /// Ending of the names of both files.
 pub(crate) const LOCK_SUFFIX: &str = ".owner";
 
