@@ -55,11 +55,11 @@ pub use sim_types::{
     ParameterValue, ParameterValues, ParticleFlags, Reason, TearCause,
 };
 pub use solver::Solver;
+pub use state::blocks::{Blocks, Chain};
 pub use state::forces::{ColliderImpulse, Forces, FrameImpulse, ParticleImpulse};
 pub use state::keyframe::{Keyframe, KeyframeError};
 pub use state::particles::Particle;
 pub use state::restore::RestoreError;
-pub use state::slots::{Slot, Slots};
 pub use step::drive::GRAB_OVER_S_MAX;
 
 /// Version of the arithmetic. It changes whenever a step produces other bits. Only the version that

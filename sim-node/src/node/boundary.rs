@@ -130,8 +130,8 @@ impl Node {
     fn rewind(&mut self, target: Target, command: &mut Command) -> Result<Applied, Reason> {
         let state = self.history.find(self.step, target)?;
         let to_step = state.step;
-        let particles = self.history.particles(state);
-        self.solver.put_in_place(particles, &state.keyframe()).map_err(|error| {
+        let (particles, keyframe) = (self.history.particles(state), self.history.keyframe(state));
+        self.solver.put_in_place(&particles, &keyframe).map_err(|error| {
             debug_assert!(
                 false,
                 "the kept state of step {to_step} does not belong to the scene: {error}"
@@ -147,14 +147,11 @@ impl Node {
     }
 
     /// Puts a given state in place. Its hash replaces that of the command.
-    fn restore(
-        &mut self,
-        given: Option<&Given>,
-        command: &mut Command,
-    ) -> Result<Applied, Reason> {
+    fn restore(&mut self, given: Option<&Given>, command: &mut Command) -> Result<Applied, Reason> {
         // A command without a state has come through the wrong service.
         let given = given.ok_or(Reason::NoEffectHere)?;
-        let state = given.as_ref().map_err(|malformed| format!("the message is malformed: {malformed}"));
+        let state =
+            given.as_ref().map_err(|malformed| format!("the message is malformed: {malformed}"));
         let result = state.and_then(|state| self.put_in_place(state).map(|()| state));
         let state = result.map_err(|problem| {
             self.warnings.print(&format!("restore: {problem}"));

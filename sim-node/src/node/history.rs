@@ -5,23 +5,28 @@ use std::rc::Rc;
 
 use anyhow::Context;
 use sim_contract::Reason;
-use sim_solver::{Keyframe, Particle, Slot, Slots, Solver};
+use sim_solver::{Blocks, Chain, Keyframe, Particle, Solver};
 
 /// Most places where the run continued from another state than the last one. Beyond it the oldest are
 /// forgotten, and steps back across them are counted as if they did not exist.
 const BRANCHES_MAX: usize = 4096;
 
-/// Kept states, in bounded memory.
+/// Part of the memory that the list of the states takes: with more of them, small scenes would have longer lists
+/// than states.
+const LIST_PART: usize = 16;
+/// Memory in the list for a state, and for a keyframe that it does not share.
+const ENTRY_SIZE_BYTES: usize = size_of::<KeptState>() + size_of::<(usize, usize, KeptKeyframe)>();
+
+/// Kept states, with their keyframes, in a fixed memory.
 ///
 /// Each step is kept while it fits. Then every second state of the older half is removed, again and
 /// again, so that the distance between states grows with their age. The oldest one stays.
 #[derive(Debug)]
 pub(super) struct History {
-    limit_bytes: usize,
     /// By ascending step, all of the same scene.
     states: VecDeque<KeptState>,
-    size_bytes: usize,
-    slots: Slots,
+    count_max: usize,
+    blocks: Blocks,
     /// By ascending step.
     branches: VecDeque<Branch>,
     newest: Option<Newest>,
@@ -32,16 +37,16 @@ pub(super) struct History {
 pub(super) struct KeptState {
     pub(super) step: u64,
     scene_step: u64,
-    particles: Slot,
+    particles: Chain,
     /// Shared by steps that differ only in their scene step.
-    keyframe: Rc<Keyframe>,
-    size_bytes: usize,
+    keyframe: Rc<KeptKeyframe>,
 }
 
-impl KeptState {
-    pub(super) fn keyframe(&self) -> Keyframe {
-        self.keyframe.at_scene_step(self.scene_step)
-    }
+/// An encoded keyframe.
+#[derive(Debug)]
+struct KeptKeyframe {
+    chain: Chain,
+    size_bytes: usize,
 }
 
 /// A step whose state was put in place: it is that of an earlier step.
@@ -54,7 +59,7 @@ struct Branch {
 /// The keyframe of the newest state, and what it depends on besides commands.
 #[derive(Debug)]
 struct Newest {
-    keyframe: Rc<Keyframe>,
+    keyframe: Rc<KeptKeyframe>,
     torn_count: usize,
     frozen_count: u64,
 }
@@ -72,11 +77,14 @@ impl History {
     /// # Errors
     /// There is not enough memory.
     pub(super) fn new(limit_bytes: usize, solver: &Solver) -> anyhow::Result<Self> {
+        const PROBLEM: &str = "no memory for --history";
+        let count_max = limit_bytes / LIST_PART / ENTRY_SIZE_BYTES;
+        let mut states = VecDeque::new();
+        states.try_reserve_exact(count_max).context(PROBLEM)?;
         let mut history = Self {
-            limit_bytes,
-            states: VecDeque::new(),
-            size_bytes: 0,
-            slots: Slots::new(limit_bytes).context("no memory for --history")?,
+            states,
+            count_max,
+            blocks: Blocks::new(limit_bytes - count_max * ENTRY_SIZE_BYTES).context(PROBLEM)?,
             branches: VecDeque::with_capacity(BRANCHES_MAX),
             newest: None,
         };
@@ -86,56 +94,66 @@ impl History {
 
     /// Forgets all states. Those of another scene follow.
     pub(super) fn restart(&mut self, solver: &Solver) {
-        let count_max = self.limit_bytes / state_size_bytes(solver);
         self.states.clear();
-        self.states.reserve(count_max);
-        self.size_bytes = 0;
-        self.slots.divide(solver.particle_count(), count_max);
-        self.branches.clear();
         self.newest = None;
+        self.branches.clear();
+        self.blocks.divide(solver.particle_count());
     }
 
-    /// Returns `true` if at least the state of one step fits, or none is asked for.
+    /// Returns `true` if at least the state of one step fits, or none is asked for. Call it before one is kept.
     pub(super) fn has_room(&self, solver: &Solver) -> bool {
-        self.limit_bytes == 0 || state_size_bytes(solver) <= self.limit_bytes
+        let keyframe_size_bytes = solver.keyframe().encode().len();
+        self.count_max == 0
+            || self.block_count(solver, keyframe_size_bytes) <= self.blocks.free_count()
+    }
+
+    /// Number of blocks of a state, with a keyframe of this size.
+    fn block_count(&self, solver: &Solver, keyframe_size_bytes: usize) -> usize {
+        let Self { blocks, .. } = self;
+        blocks.count_for(solver.particle_count()) + blocks.count_for_bytes(keyframe_size_bytes)
     }
 
     /// Keeps the state after a step. `is_commanded` is true if a command was applied before it.
     pub(super) fn keep(&mut self, step: u64, solver: &Solver, is_commanded: bool) {
-        if self.limit_bytes == 0 {
+        if self.count_max == 0 {
             return;
         }
-        let keyframe = self.keyframe(solver, is_commanded);
-        // A shared keyframe counts for each of its states, so that the memory is never exceeded.
-        let size_bytes = state_size_bytes(solver) + keyframe.size_bytes();
-        if size_bytes > self.limit_bytes {
-            return;
-        }
-        while self.size_bytes + size_bytes > self.limit_bytes && !self.states.is_empty() {
-            self.thin();
-        }
-        let Some(particles) = self.slots.store(solver.particles()) else {
-            unreachable!("{} states fill the memory for more of them", self.states.len())
-        };
-        self.size_bytes += size_bytes;
-        let scene_step = solver.scene_step();
-        self.states.push_back(KeptState { step, scene_step, particles, keyframe, size_bytes });
-    }
-
-    /// Returns the keyframe of the solver. Its scene step may be an earlier one.
-    fn keyframe(&mut self, solver: &Solver, is_commanded: bool) -> Rc<Keyframe> {
         let (torn_count, frozen_count) = (solver.torn().len(), solver.frozen_count());
-        let is_same = |newest: &&Newest| {
+        let is_same = |newest: &mut Newest| {
             !is_commanded
                 && solver.grabs().len() == 0
                 && (newest.torn_count, newest.frozen_count) == (torn_count, frozen_count)
         };
-        if let Some(newest) = self.newest.as_ref().filter(is_same) {
-            return Rc::clone(&newest.keyframe);
+        if self.newest.as_mut().is_none_or(|newest| !is_same(newest)) {
+            let bytes = solver.keyframe().encode();
+            self.forget_newest();
+            if !self.make_room(self.block_count(solver, bytes.len())) {
+                return;
+            }
+            let Some(chain) = self.blocks.store_bytes(&bytes) else { return };
+            let keyframe = Rc::new(KeptKeyframe { chain, size_bytes: bytes.len() });
+            self.newest = Some(Newest { keyframe, torn_count, frozen_count });
         }
-        let keyframe = Rc::new(solver.keyframe());
-        self.newest = Some(Newest { keyframe: Rc::clone(&keyframe), torn_count, frozen_count });
-        keyframe
+        // The newest keyframe fits beside one state: it was stored for one.
+        if self.make_room(self.block_count(solver, 0))
+            && let Some(newest) = &self.newest
+            && let Some(particles) = self.blocks.store(solver.particles())
+        {
+            let (scene_step, keyframe) = (solver.scene_step(), Rc::clone(&newest.keyframe));
+            self.states.push_back(KeptState { step, scene_step, particles, keyframe });
+        }
+    }
+
+    /// Removes states until this number of blocks is free, and there is a place in the list. Returns `false` if the
+    /// blocks are not free without any state.
+    fn make_room(&mut self, block_count: usize) -> bool {
+        while self.blocks.free_count() < block_count || self.states.len() == self.count_max {
+            if self.states.is_empty() {
+                return false;
+            }
+            self.thin();
+        }
+        true
     }
 
     /// Removes every second state of the older half, but not the oldest. A single state is removed.
@@ -143,32 +161,56 @@ impl History {
         let older_count = (self.states.len() / 2).max(2);
         let is_removed = |index: usize| index < older_count && index % 2 == 1;
         if self.states.len() == 1 {
-            self.remove_all();
+            self.remove_last();
             return;
         }
-        let mut index = 0;
-        let Self { states, slots, size_bytes, .. } = self;
-        states.retain(|state| {
-            let keeps = !is_removed(index);
-            index += 1;
-            if !keeps {
-                *size_bytes -= state.size_bytes;
-                slots.release(state.particles);
+        // The states behind the first removed one move up.
+        let mut kept_count = 1;
+        for index in 1..self.states.len() {
+            if !is_removed(index) {
+                self.states.swap(kept_count, index);
+                kept_count += 1;
             }
-            keeps
-        });
-    }
-
-    fn remove_all(&mut self) {
-        for state in self.states.drain(..) {
-            self.slots.release(state.particles);
         }
-        self.size_bytes = 0;
+        while self.states.len() > kept_count {
+            self.remove_last();
+        }
     }
 
-    /// Returns the particles of a kept state.
-    pub(super) fn particles(&self, state: &KeptState) -> &[Particle] {
-        self.slots.particles(state.particles)
+    fn remove_last(&mut self) {
+        if let Some(KeptState { particles, keyframe, .. }) = self.states.pop_back() {
+            self.blocks.release(particles);
+            self.drop_keyframe(keyframe);
+        }
+    }
+
+    fn forget_newest(&mut self) {
+        if let Some(newest) = self.newest.take() {
+            self.drop_keyframe(newest.keyframe);
+        }
+    }
+
+    /// Frees the memory of a keyframe that no other state shares.
+    fn drop_keyframe(&mut self, keyframe: Rc<KeptKeyframe>) {
+        if let Ok(keyframe) = Rc::try_unwrap(keyframe) {
+            self.blocks.release(keyframe.chain);
+        }
+    }
+
+    /// Returns a copy of the particles of a kept state.
+    pub(super) fn particles(&self, state: &KeptState) -> Vec<Particle> {
+        self.blocks.read(&state.particles)
+    }
+
+    /// Returns a copy of the keyframe of a kept state.
+    pub(super) fn keyframe(&self, state: &KeptState) -> Keyframe {
+        let KeptKeyframe { chain, size_bytes } = &*state.keyframe;
+        let bytes = self.blocks.read_bytes(chain, *size_bytes);
+        let keyframe = Keyframe::decode(&bytes);
+        let Ok(keyframe) = keyframe else {
+            unreachable!("an encoded keyframe decodes: {keyframe:?}")
+        };
+        keyframe.at_scene_step(state.scene_step)
     }
 
     /// Notes that the state of `step` is that of the step `from`.
@@ -181,7 +223,7 @@ impl History {
 
     /// Returns the newest kept state at or before the target. The last step is `step`.
     pub(super) fn find(&self, step: u64, target: Target) -> Result<&KeptState, Reason> {
-        if self.limit_bytes == 0 {
+        if self.count_max == 0 {
             return Err(Reason::NoEffectHere);
         }
         let target = match target {
@@ -213,11 +255,6 @@ impl History {
     }
 }
 
-/// Memory of a state without its keyframe, which other states may share.
-fn state_size_bytes(solver: &Solver) -> usize {
-    size_of::<KeptState>() + size_of_val(solver.particles())
-}
-
 #[cfg(test)]
 mod tests {
     //! Checks which states are kept, and that each is the one of its step.
@@ -230,6 +267,10 @@ mod tests {
         Solver::new(&Scene::from_toml(text, "pendulum").unwrap())
     }
 
+    fn cloth() -> Solver {
+        Solver::new(&Scene::from_toml(builtin::text("curtain").unwrap(), "curtain").unwrap())
+    }
+
     fn steps(history: &History) -> Vec<u64> {
         history.states.iter().map(|state| state.step).collect()
     }
@@ -237,8 +278,8 @@ mod tests {
     /// A history with room for about `count` states, after the steps up to `last`.
     fn history_after(count: usize, last: u64) -> History {
         let mut solver = pendulum();
-        let size_bytes = state_size_bytes(&solver) + solver.keyframe().size_bytes();
-        let mut history = History::new(count * size_bytes, &solver).unwrap();
+        // A list with so many places. The blocks beside it hold more.
+        let mut history = History::new(count * LIST_PART * ENTRY_SIZE_BYTES, &solver).unwrap();
         history.keep(0, &solver, false);
         for step in 1..=last {
             solver.step();
@@ -263,9 +304,6 @@ mod tests {
             let gaps: Vec<_> = kept.windows(2).map(|pair| pair[1] - pair[0]).collect();
             assert_eq!(gaps[gaps.len() - 16..], [1; 16], "{gaps:?}");
             assert!(gaps.is_sorted_by(|old, new| new <= old), "{gaps:?}");
-            assert!(history.size_bytes <= history.limit_bytes);
-            let sum: usize = history.states.iter().map(|state| state.size_bytes).sum();
-            assert_eq!(history.size_bytes, sum);
         }
     }
 
@@ -275,7 +313,8 @@ mod tests {
         let history = history_after(0, 7);
         assert!(steps(&history).is_empty());
         assert!(history.has_room(&pendulum()), "none is asked for");
-        assert!(!History::new(10, &pendulum()).unwrap().has_room(&pendulum()));
+        let too_small = History::new(LIST_PART * ENTRY_SIZE_BYTES, &cloth()).unwrap();
+        assert!(!too_small.has_room(&cloth()));
     }
 
     #[test]
@@ -296,14 +335,18 @@ mod tests {
             let kept = [20, 90].contains(&step);
             history.keep(step, &solver, kept);
             hashes.push(solver.state_hash());
-            assert_eq!(history.states.back().unwrap().keyframe(), solver.keyframe(), "{step}");
+            assert_eq!(
+                history.keyframe(history.states.back().unwrap()),
+                solver.keyframe(),
+                "{step}"
+            );
         }
         for from in [0, 19, 20, 25, 89, 90, 150] {
             let state =
                 history.find(199, Target { to_step: Some(from), back_steps: None }).unwrap();
             assert_eq!(state.step, from);
             let mut again = pendulum();
-            again.put_in_place(history.particles(state), &state.keyframe()).unwrap();
+            again.put_in_place(&history.particles(state), &history.keyframe(state)).unwrap();
             again.step();
             assert_eq!(again.state_hash(), hashes[usize::try_from(from).unwrap()]);
             let commanded = [20, 90].into_iter().find(|step| *step > from).unwrap_or(200);
@@ -311,6 +354,45 @@ mod tests {
                 again.step();
                 assert_eq!(again.state_hash(), hashes[usize::try_from(step).unwrap()], "{step}");
             }
+        }
+    }
+
+    /// The bytes that a history takes beside its branches.
+    fn size_bytes(history: &History) -> usize {
+        let keyframes = history.states.iter().map(|state| Rc::as_ptr(&state.keyframe));
+        let keyframes: std::collections::BTreeSet<_> = keyframes.collect();
+        history.blocks.size_bytes()
+            + history.states.capacity() * size_of::<KeptState>()
+            + keyframes.len() * (ENTRY_SIZE_BYTES - size_of::<KeptState>())
+    }
+
+    #[test]
+    fn states_with_keyframes_of_their_own_stay_within_the_memory_and_it_is_full() {
+        for (mut solver, limit_bytes) in [(pendulum(), 1 << 17), (cloth(), 1 << 20)] {
+            let mut history = History::new(limit_bytes, &solver).unwrap();
+            let mut fullest = 0;
+            for step in 0..2000 {
+                // Each step needs a keyframe of its own.
+                history.keep(step, &solver, true);
+                assert!(size_bytes(&history) <= limit_bytes, "{step}");
+                let state = history.states.back().unwrap();
+                assert_eq!(
+                    (state.step, history.particles(state)),
+                    (step, solver.particles().to_vec())
+                );
+                fullest = fullest.max(history.states.len());
+                if step % 100 == 99 {
+                    solver.step();
+                }
+            }
+            let state = history.block_count(&solver, solver.keyframe().encode().len());
+            let all = history.blocks.free_count() + history.states.len() * state;
+            assert!(fullest == history.count_max || (fullest + 1) * state > all, "{fullest}");
+            while !history.states.is_empty() {
+                history.remove_last();
+            }
+            history.forget_newest();
+            assert_eq!(history.blocks.free_count(), all, "every block is free again");
         }
     }
 

@@ -102,7 +102,7 @@ impl Node {
         match first.received.command.action() {
             Action::Rewind { to_step, back_steps } => {
                 let state = self.history.find(self.step, Target { to_step, back_steps }).ok()?;
-                self.solver.plan_state(&state.keyframe())
+                self.solver.plan_state(&self.history.keyframe(state))
             }
             Action::Restore { .. } => {
                 let state = first.state.as_deref()?.as_ref().ok()?;
