@@ -199,6 +199,63 @@ fn the_prose_check_finds_faults() {
     assert_eq!(prose.lines_with("three four"), [2]);
 }
 
+/// Returns true if a line of code has the keyword `unsafe`.
+fn is_unsafe(line: &str) -> bool {
+    let code = line.split("//").next().unwrap_or(line);
+    let follows =
+        |rest: &str| ["{", "fn ", "impl ", "extern "].iter().any(|one| rest.starts_with(one));
+    code.contains("#[unsafe(") || code.split("unsafe ").skip(1).any(follows)
+}
+
+/// Returns the paths in the paragraph of ARCHITECTURE.md on unsafe code. Files come before their folder.
+fn listed_as_unsafe(architecture: &str) -> BTreeSet<PathBuf> {
+    let from =
+        architecture.split_once("`unsafe` code is in ").expect("the paragraph on unsafe code").1;
+    let paragraph = from.split("\n\n").next().unwrap_or(from);
+    let (mut paths, mut files) = (BTreeSet::new(), Vec::new());
+    for span in paragraph.split('`').skip(1).step_by(2) {
+        if !span.ends_with('/') {
+            files.push(span);
+        } else if files.is_empty() {
+            paths.insert(PathBuf::from(span));
+        } else {
+            paths.extend(files.drain(..).map(|file| Path::new(span).join(file)));
+        }
+    }
+    paths
+}
+
+#[test]
+fn unsafe_code_is_where_the_architecture_says() {
+    let listed = listed_as_unsafe(&read(Path::new("ARCHITECTURE.md")));
+    let is_test = |file: &Path| file.iter().any(|part| part == "tests" || part == "benches");
+    let is_found = |file: &PathBuf| !is_test(file) && read(file).lines().any(is_unsafe);
+    let found: Vec<_> = files(&["rs"]).into_iter().filter(is_found).collect();
+    let missing: Vec<_> =
+        found.iter().filter(|file| !listed.iter().any(|path| file.starts_with(path))).collect();
+    let unused: Vec<_> =
+        listed.iter().filter(|path| !found.iter().any(|file| file.starts_with(path))).collect();
+    assert!(
+        missing.is_empty() && unused.is_empty(),
+        "ARCHITECTURE.md does not list {missing:?}, and lists {unused:?} without unsafe code"
+    );
+}
+
+#[test]
+fn the_check_for_unsafe_code_finds_it() {
+    for line in
+        ["unsafe { a }", "pub unsafe fn a()", "#[unsafe(no_mangle)]", "unsafe impl A for B {}"]
+    {
+        assert!(is_unsafe(line), "{line}");
+    }
+    for line in ["// unsafe { a }", "#![forbid(unsafe_code)]", "fn is_unsafe(a: char)"] {
+        assert!(!is_unsafe(line), "{line}");
+    }
+    let text = "`unsafe` code is in `a/`, in `b.rs` and `c/d.rs` of\n`e/`, and in `f/`.\n\n`g/`";
+    let expected = ["a/", "e/b.rs", "e/c/d.rs", "f/"].map(PathBuf::from);
+    assert_eq!(listed_as_unsafe(text), BTreeSet::from(expected));
+}
+
 #[test]
 fn files_within_a_crate_form_no_circle() {
     let manifest = root().join("Cargo.toml");

@@ -126,7 +126,7 @@ impl BodyContacts {
                 self.candidates.push(particle);
             }
         }
-        #[allow(clippy::cast_possible_truncation, reason = "a scene has at most 64 colliders")]
+        #[allow(clippy::cast_possible_truncation, reason = "at most 2^16 colliders")]
         let key = |particle: &u32| order_key(*particle, collider as u32);
         order_by_key(&self.candidates, &mut self.ordered, key);
     }
