@@ -6,6 +6,7 @@ pub(crate) mod column_writer;
 pub(crate) mod columns;
 pub(crate) mod families;
 pub(crate) mod fields;
+pub(crate) mod incidence;
 pub(crate) mod order;
 pub(crate) mod parameters;
 pub(crate) mod projection;

@@ -64,4 +64,4 @@ pub use step::drive::GRAB_OVER_S_MAX;
 
 /// Version of the arithmetic. It changes whenever a step produces other bits. Only the version that
 /// made a recording can re-simulate it.
-pub const SOLVER_VERSION: u32 = 10;
+pub const SOLVER_VERSION: u32 = 11;

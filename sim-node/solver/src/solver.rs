@@ -13,6 +13,7 @@ use crate::constraints::order::ProjectionOrders;
 use crate::constraints::tethers::{TetherBasis, Tethers};
 use crate::contacts::bodies::BodyContacts;
 use crate::contacts::colliders::{Collider, PlacedCollider};
+use crate::contacts::contact::reaction::ReactionRoom;
 use crate::contacts::obstacle::{OBSTACLES_PER_COLLIDER, Obstacle};
 use crate::contacts::pairs::ParticleContacts;
 use crate::kernels::Kernels;
@@ -258,9 +259,11 @@ impl Solver {
     fn derive_particle_contacts(&mut self) {
         let thickness = self.parameters.contact_thickness;
         if !self.particle_contacts.are_derived_from(thickness) {
-            let kernels = self.store.kernels();
-            self.particle_contacts =
-                ParticleContacts::new(&self.model, self.contact_mode, thickness, kernels);
+            if !self.accept_particle_contacts() {
+                let kernels = self.store.kernels();
+                self.particle_contacts =
+                    ParticleContacts::new(&self.model, self.contact_mode, thickness, kernels);
+            }
             self.particle_contacts.locate(&self.store);
         }
     }
@@ -473,7 +476,11 @@ impl Solver {
             self.store.forget_forces();
             self.measurement = None;
         } else if self.measurement.is_none() {
-            let measurement = Measurement::new(self.collider_count(), self.anchor_count());
+            let collider_count = self.collider_count();
+            let measurement = Measurement::new(collider_count, self.anchor_count());
+            let masses = self.model.particles.iter().map(|one| f64::from(one.mass));
+            let mass_max = masses.fold(f64::MIN_POSITIVE, f64::max);
+            self.store.measure_reactions(ReactionRoom { collider_count, mass_max });
             self.measurement = Some(Box::new(measurement));
         }
     }

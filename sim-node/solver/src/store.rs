@@ -25,7 +25,7 @@ pub(crate) use layout::{Configured, Location, SceneFields, TetherPlace};
 use patch::Patch;
 use patch::sheets::{Found, families_of, find_sheet, loose_particles, pure_sheets};
 pub(crate) use paths::{Paths, Progress};
-pub(crate) use pulls::{Receivers, TetherEnds};
+pub(crate) use pulls::TetherEnds;
 use rows::Rows;
 use survey::Survey;
 use workers::Workers;

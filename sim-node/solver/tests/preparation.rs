@@ -1,4 +1,4 @@
-//! Constraints that are prepared beside a solver: the same bits as without, whatever happens between the
+//! Constraints and contacts that are prepared beside a solver: the same bits as without, whatever happens between the
 //! plan and the command, and whatever the spare was used for before.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
@@ -152,6 +152,60 @@ fn prepared_constraints_change_no_bit() {
     }
     assert!(assisted.plan_count > 40, "{}", assisted.plan_count);
     assert!(torn_counts.iter().any(|count| *count > 0), "nothing tore");
+}
+
+/// Cloths that touch as surfaces and loose particles between them.
+const TOUCHING: &str = "version = 1\n[contact]\nmode = \"surfaces\"\nthickness = 0.02\n\
+    [[generate]]\nshape = \"cloth\"\ncolumns = 24\nrows = 24\nspacing = 0.05\n\
+    right = [1, 0, 0]\ndown = [0, 0, 1]\npinned = \"corners\"\n\
+    [[generate]]\nshape = \"mesh\"\ncolumns = 12\nrows = 12\nspacing = 0.05\norigin = [0.2, 0.05, 0.2]\n\
+    right = [1, 0, 0]\ndown = [0, 0, 1]\n\
+    [[particle]]\nposition = [0.4, 0.1, 0.4]\n[[particle]]\nposition = [0.41, 0.13, 0.4]\n";
+
+#[test]
+fn prepared_contacts_change_no_bit() {
+    let mut plain = solver(TOUCHING);
+    let mut assisted = Assisted { solver: plain.clone(), spare: None, plan_count: 0 };
+    let off = Action::Set {
+        parameter: Text::cut(Parameter::Contact.name()),
+        value: ParameterValue::Off,
+        constraint_kind: None,
+        block: None,
+        collider: None,
+    };
+    let actions = [
+        set(Parameter::Contact, 0.03),
+        set(Parameter::Contact, 0.01),
+        Action::Reset,
+        off,
+        set(Parameter::Contact, 0.025),
+        set(Parameter::Substeps, 3.0),
+        Action::Reset,
+    ];
+    for (round, action) in actions.iter().cycle().take(14).enumerate() {
+        let plan = assisted.solver.plan([*action]);
+        let prepared = assisted.prepare(plan);
+        let overtaking = set(Parameter::Contact, 0.015);
+        for step in 0..10 {
+            if step == 5 && round == 8 {
+                // What was prepared does not fit, once another command has come first.
+                plain.apply(7, &overtaking).unwrap();
+                assisted.finish(None, |solver| _ = solver.apply(7, &overtaking).unwrap());
+            }
+            plain.step();
+            assisted.solver.step();
+        }
+        plain.apply(7, action).unwrap();
+        plain.finish_boundary();
+        assisted.finish(prepared, |solver| _ = solver.apply(7, action).unwrap());
+        for _ in 0..20 {
+            plain.step();
+            assisted.solver.step();
+            assert_eq!(plain.state_hash(), assisted.solver.state_hash(), "{round}: {action:?}");
+        }
+        assert_eq!(plain.keyframe(), assisted.solver.keyframe());
+    }
+    assert_eq!(assisted.plan_count, 14, "each has work to plan");
 }
 
 #[test]

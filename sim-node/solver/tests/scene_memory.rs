@@ -1,11 +1,11 @@
 //! Memory to read a scene: no text of the largest size takes more than a fixed amount beyond the scene
-//! itself. A counting allocator measures the peak.
+//! itself. And memory to measure forces: none for what is not in contact. A counting allocator measures the peak.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
-use sim_solver::{Scene, SceneError};
+use sim_solver::{Scene, SceneError, Solver};
 use sim_types::SCENE_SIZE_BYTES_MAX;
 
 /// Most memory that reading may take beyond the scene, in bytes.
@@ -151,6 +151,27 @@ fn a_dense_mesh_is_read() {
     });
     let mesh = MESH.replace("VERTICES", &vertices).replace('@', &faces.collect::<String>());
     assert!(read(&mesh).is_ok());
+}
+
+/// The cloth has 2,000 rows of three groups of particles, above 500 colliders.
+#[test]
+fn forces_take_no_memory_for_rows_and_colliders_that_do_not_touch() {
+    let ball =
+        |at| format!("[[collider]]\nshape = \"sphere\"\ncenter = [{at}, -9, 0]\nradius = 0.4\n");
+    let text =
+        "version = 1\n[solver]\nsubsteps = 2\n[[generate]]\nshape = \"cloth\"\ncolumns = 24\n\
+        rows = 2000\nspacing = 0.01\nright = [0, 0, 1]\ndown = [1, 0, 0]\n"
+            .to_owned();
+    let text = (0..500).fold(text, |text, at| text + &ball(at));
+    let mut solver = Solver::new(&Scene::from_toml(&text, "f").unwrap());
+    solver.step();
+    let before = LIVE.get();
+    PEAK.set(before);
+    solver.compute_forces(true);
+    solver.finish_boundary();
+    solver.step();
+    let memory = PEAK.get() - before;
+    assert!(memory < 4 << 20, "{} KiB", memory >> 10);
 }
 
 #[test]

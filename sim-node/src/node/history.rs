@@ -278,7 +278,7 @@ mod tests {
     /// A history with room for about `count` states, after the steps up to `last`.
     fn history_after(count: usize, last: u64) -> History {
         let mut solver = pendulum();
-        // A list with so many places. The blocks beside it hold more.
+        // A list with room for `count` states. The blocks beside it hold more.
         let mut history = History::new(count * LIST_PART * ENTRY_SIZE_BYTES, &solver).unwrap();
         history.keep(0, &solver, false);
         for step in 1..=last {

@@ -1,21 +1,26 @@
-//! Commands that change every constraint of a large scene. They are prepared beside the loop, and their
+//! Commands that change every constraint of a large scene, or the distance of its contacts. They are prepared beside the loop, and their
 //! recording verifies.
 
 use integration_tests::{DEADLINE, Process, Program, Sandbox, ctl, record, wait_for};
 use sim_contract::{Action, Client, ParameterValue, Text};
 
-fn large_scene(sandbox: &Sandbox, columns: u32) -> String {
+/// Keys of `[solver]` for a scene whose paths change with the compliance.
+const TETHERS: &str = "tethers = true";
+/// Keys for a scene whose particles touch each other.
+const CONTACTS: &str = "[contact]\nmode = \"particles\"";
+
+fn large_scene(sandbox: &Sandbox, columns: u32, keys: &str) -> String {
     let text = format!(
-        "version = 1\n[solver]\nrate_hz = 240\ntethers = true\n[[generate]]\nshape = \"cloth\"\n\
+        "version = 1\n[solver]\nrate_hz = 240\n{keys}\n[[generate]]\nshape = \"cloth\"\n\
          columns = {columns}\nrows = {columns}\nspacing = 0.01\nmass = 0.01\n"
     );
     sandbox.write("large.toml", &text)
 }
 
-fn set_compliance(value: f32) -> Action {
+fn set(parameter: &str, value: f32) -> Action {
     let value = ParameterValue::Number(value);
     Action::Set {
-        parameter: Text::new("compliance").unwrap(),
+        parameter: Text::new(parameter).unwrap(),
         value,
         constraint_kind: None,
         block: None,
@@ -25,17 +30,24 @@ fn set_compliance(value: f32) -> Action {
 
 #[test]
 fn a_set_of_a_large_scene_is_prepared_beside_the_loop_and_only_its_client_waits() {
+    assert_is_prepared(TETHERS, "compliance", 1e-6);
+    assert_is_prepared(CONTACTS, "contact", 5e-3);
+}
+
+/// Sets a parameter of a large scene with these keys, again and again, beginning with a value, until another client
+/// has had answers meanwhile.
+fn assert_is_prepared(keys: &str, parameter: &str, first: f32) {
     let sandbox = Sandbox::new();
-    let scene = large_scene(&sandbox, 200);
+    let scene = large_scene(&sandbox, 200, keys);
     let node = Process::start_ready(Program::SimNode, &sandbox, &["run", &scene]);
     let mut setter = Client::attach_as(&sandbox.endpoint(), 7).unwrap();
     let mut other = Client::attach_as(&sandbox.endpoint(), 8).unwrap();
-    let mut compliance = 1e-6;
+    let mut value = first;
     // Two answers, because one could be of the poll that received the command. The work may also end
     // before they come.
     wait_for("two answers during the work", || {
-        compliance *= 1.1;
-        setter.send(set_compliance(compliance)).unwrap();
+        value = if value < 3.0 * first { 1.1 * value } else { first };
+        setter.send(set(parameter, value)).unwrap();
         setter.send(Action::Pin { particle: 1 }).unwrap();
         let answers =
             [0; 3].map(|_| other.request(Action::Pin { particle: 20 }, DEADLINE).unwrap().index);
@@ -43,8 +55,9 @@ fn a_set_of_a_large_scene_is_prepared_beside_the_loop_and_only_its_client_waits(
         let pin = setter.next_outcome(DEADLINE).unwrap().unwrap();
         assert!(set.is_applied() && pin.is_applied(), "{set:?} {pin:?}");
         assert!(set.index < pin.index, "the commands of a client keep their order");
-        let value = ctl(&sandbox, &["get"])["compliance"]["structural"].as_f64().unwrap();
-        assert!((value - f64::from(compliance)).abs() < 1e-9, "{value} {compliance}");
+        let shown = &ctl(&sandbox, &["get"])[parameter];
+        let shown = shown.as_f64().or(shown["structural"].as_f64()).unwrap();
+        assert!((shown - f64::from(value)).abs() < 1e-9, "{shown} {value}");
         (answers[1] < set.index).then_some(())
     });
     node.interrupt().success();
@@ -52,8 +65,14 @@ fn a_set_of_a_large_scene_is_prepared_beside_the_loop_and_only_its_client_waits(
 
 #[test]
 fn a_recording_of_prepared_commands_verifies() {
+    assert_verifies(TETHERS, "compliance", 1e-6);
+    assert_verifies(CONTACTS, "contact", 1e-3);
+}
+
+/// Records settings of a parameter, multiples of a unit, in a scene with these keys.
+fn assert_verifies(keys: &str, parameter: &str, unit: f32) {
     let sandbox = Sandbox::new();
-    let (scene, file) = (large_scene(&sandbox, 50), sandbox.path("prepared.mcap"));
+    let (scene, file) = (large_scene(&sandbox, 50, keys), sandbox.path("prepared.mcap"));
     let node = Process::start_ready(Program::SimNode, &sandbox, &["run", &scene]);
     let recording = record(&sandbox, &file);
     let mut clients = [3, 4].map(|id| Client::attach_as(&sandbox.endpoint(), id).unwrap());
@@ -61,9 +80,9 @@ fn a_recording_of_prepared_commands_verifies() {
     for round in 0_u16..12 {
         // Both are under way at once, with cuts and pins between a plan and its command.
         let [first, second] = &mut clients;
-        first.send(set_compliance(1e-6 * f32::from(round))).unwrap();
+        first.send(set(parameter, unit * f32::from(round))).unwrap();
         first.send(Action::Pin { particle: u32::from(round) * 31 }).unwrap();
-        second.send(set_compliance(1e-5 * f32::from(round))).unwrap();
+        second.send(set(parameter, unit / 2.0 * f32::from(round))).unwrap();
         second.send(Action::CutRadius { center: [0.2, -0.2, 0.0], radius: 0.05 }).unwrap();
         if round % 3 == 1 {
             first.send(Action::Rewind { to_step: None, back_steps: Some(20) }).unwrap();

@@ -1,4 +1,4 @@
-//! Plans the constraints that commands need, and takes prepared ones over.
+//! Plans the constraints and contacts that commands need, and takes prepared ones over.
 
 use std::sync::Arc;
 
@@ -13,6 +13,8 @@ use crate::state::keyframe::Keyframe;
 /// Number of constraints below which a command is cheaper than another thread: it takes about 0.1 us
 /// for each constraint, and a thread takes 0.1 ms to start.
 const CONSTRAINTS_MIN: usize = 2000;
+/// Number of particles from which on contacts are derived on another thread: it takes about 1 us for each.
+const CONTACTS_MIN: usize = 500;
 
 impl Solver {
     /// Returns the work that makes a reset, or settings that follow each other, cheap. None if they are
@@ -58,13 +60,14 @@ impl Solver {
         torn: &[u32],
         tether_basis: Option<TetherBasis>,
     ) -> Option<Plan> {
-        if self.constraint_count() < CONSTRAINTS_MIN {
-            return None;
-        }
+        let has_contacts = self.particle_contacts.are_derived_from(parameters.contact_thickness);
         let has_tethers = tether_basis
             .as_ref()
             .is_none_or(|basis| self.tethers.are_derived_from(parameters, basis));
-        if has_tethers && self.store.is_derived_from(parameters) {
+        let has_constraints = has_tethers && self.store.is_derived_from(parameters);
+        if (has_constraints || self.constraint_count() < CONSTRAINTS_MIN)
+            && (has_contacts || self.particle_count() < CONTACTS_MIN)
+        {
             return None;
         }
         Some(Plan {
@@ -74,8 +77,10 @@ impl Solver {
             setup: self.setup(parameters),
             fields: self.scene_fields(parameters),
             parameters: parameters.clone(),
+            has_new_constraints: !has_constraints,
             torn: torn.to_vec(),
             tether_basis,
+            contact_mode: (!has_contacts).then_some(self.contact_mode),
         })
     }
 
@@ -97,11 +102,24 @@ impl Solver {
     /// particles have new locations then.
     pub(crate) fn accept_constraints(&mut self) -> bool {
         let Self { offered, store, parameters, .. } = self;
-        let offered = offered.as_mut().filter(|offered| {
-            offered.store.is_derived_from(parameters) && !store.is_derived_from(parameters)
+        let offered = offered.as_mut().and_then(|offered| offered.store.as_mut());
+        let offered = offered.filter(|offered| {
+            offered.is_derived_from(parameters) && !store.is_derived_from(parameters)
         });
         if let Some(offered) = offered {
-            store.exchange(&mut offered.store);
+            store.exchange(offered);
+            return true;
+        }
+        false
+    }
+
+    /// Takes offered contacts over if they have the current distance.
+    pub(crate) fn accept_particle_contacts(&mut self) -> bool {
+        let Self { offered, particle_contacts, parameters, .. } = self;
+        let offered = offered.as_mut().and_then(|offered| offered.particle_contacts.as_mut());
+        let thickness = parameters.contact_thickness;
+        if let Some(offered) = offered.filter(|offered| offered.are_derived_from(thickness)) {
+            std::mem::swap(particle_contacts, offered);
             return true;
         }
         false
@@ -117,5 +135,37 @@ impl Solver {
             return true;
         }
         false
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use sim_types::{ParameterValue, Text};
+
+    use super::*;
+    use crate::scene::Scene;
+
+    #[test]
+    fn a_boundary_takes_prepared_contacts_over_without_new_constraints() {
+        let text = "version = 1\n[contact]\nmode = \"particles\"\n[[generate]]\nshape = \"cloth\"\n\
+            columns = 40\nrows = 40\nspacing = 0.01\n";
+        let mut solver = Solver::new(&Scene::from_toml(text, "test").unwrap());
+        let set = |value| Action::Set {
+            parameter: Text::cut("contact"),
+            value: ParameterValue::Number(value),
+            constraint_kind: None,
+            block: None,
+            collider: None,
+        };
+        let plan = solver.plan([set(0.02)]).unwrap();
+        assert!(!plan.has_new_constraints);
+        solver.offer(plan.prepare(None));
+        // Another distance than that of the offer.
+        solver.apply(1, &set(0.03)).unwrap();
+        assert!(!solver.accept_particle_contacts());
+        solver.apply(1, &set(0.02)).unwrap();
+        assert!(solver.accept_particle_contacts());
+        assert!(solver.particle_contacts.are_derived_from(Some(0.02)));
+        assert!(solver.plan([set(0.02)]).is_none());
     }
 }

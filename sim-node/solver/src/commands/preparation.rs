@@ -1,7 +1,7 @@
-//! Constraints that another thread derives while the solver steps.
+//! Constraints and contacts that another thread derives while the solver steps.
 //!
-//! A command that changes a parameter of every constraint costs as much as several steps of a large
-//! scene. `Solver::plan` describes the work, [`Plan::prepare`] does it on any thread, and after
+//! A command that changes a parameter of every constraint, or the contact distance, costs as much as several steps of a
+//! large scene. `Solver::plan` describes the work, [`Plan::prepare`] does it on any thread, and after
 //! `Solver::offer` the command takes the result over. Without a result, or with one that no longer
 //! fits, the command does the work itself. The bits are the same in any case.
 
@@ -10,13 +10,15 @@ use std::sync::Arc;
 use crate::constraints::builder::{ConstraintBuilder, Setup};
 use crate::constraints::order::ProjectionOrders;
 use crate::constraints::tethers::{TetherBasis, Tethers};
+use crate::contacts::pairs::ParticleContacts;
 use crate::kernels::Kernels;
 use crate::parameters::Parameters;
+use crate::scene::definition::contact::ContactMode;
 use crate::scene::definition::settings::ConstraintOrder;
 use crate::scene::model::Model;
 use crate::store::{ParticleStore, SceneFields};
 
-/// Constraints to derive.
+/// Constraints, tethers and contacts to derive.
 #[derive(Debug)]
 pub struct Plan {
     pub(super) model: Arc<Model>,
@@ -25,18 +27,24 @@ pub struct Plan {
     pub(super) setup: Setup,
     pub(super) fields: SceneFields,
     pub(super) parameters: Parameters,
+    /// True if the constraints or the tethers change, false if only the contacts do.
+    pub(super) has_new_constraints: bool,
     /// In any order.
     pub(super) torn: Vec<u32>,
     /// None in scenes without tethers, and if they stay.
     pub(super) tether_basis: Option<TetherBasis>,
+    /// None if the contact distance stays.
+    pub(super) contact_mode: Option<ContactMode>,
 }
 
-/// The constraints of a [`Plan`], for [`Solver::offer`](crate::Solver::offer).
+/// The constraints and contacts of a [`Plan`], for [`Solver::offer`](crate::Solver::offer).
 #[derive(Debug, Clone)]
 pub struct Prepared {
     pub(super) model: Arc<Model>,
-    pub(super) store: ParticleStore,
+    /// None in the result of a first plan without new constraints.
+    pub(super) store: Option<ParticleStore>,
     pub(super) tethers: Tethers,
+    pub(super) particle_contacts: Option<ParticleContacts>,
 }
 
 /// Memory for the constraints of another [`Plan`].
@@ -44,14 +52,30 @@ pub struct Prepared {
 pub struct Spare(pub(super) Box<Prepared>);
 
 impl Plan {
-    /// Derives the constraints. A spare of the same scene saves most of the time.
+    /// Derives everything. A spare of the same scene saves most of the time.
     pub fn prepare(self, spare: Option<Spare>) -> Prepared {
         let spare = spare.filter(|Spare(spare)| Arc::ptr_eq(&spare.model, &self.model));
-        let new_store = || {
-            let orders = ProjectionOrders::new(&self.model, self.order);
-            ParticleStore::new(&self.model, &orders, self.kernels)
-        };
-        let mut store = spare.map_or_else(new_store, |Spare(spare)| spare.store);
+        let mut store = spare.and_then(|Spare(spare)| spare.store);
+        let mut tethers = Tethers::default();
+        if self.has_new_constraints {
+            self.configure(store.get_or_insert_with(|| self.new_store()));
+            let new_tethers =
+                |basis| Tethers::new(&self.model, &self.parameters, basis, self.fields.tethers);
+            tethers = self.tether_basis.clone().map(new_tethers).unwrap_or_default();
+        }
+        let particle_contacts = self.contact_mode.map(|mode| {
+            let thickness = self.parameters.contact_thickness;
+            ParticleContacts::new(&self.model, mode, thickness, self.kernels)
+        });
+        Prepared { store, tethers, particle_contacts, model: self.model }
+    }
+
+    fn new_store(&self) -> ParticleStore {
+        let orders = ProjectionOrders::new(&self.model, self.order);
+        ParticleStore::new(&self.model, &orders, self.kernels)
+    }
+
+    fn configure(&self, store: &mut ParticleStore) {
         let mut is_torn = vec![false; self.model.constraints.len()];
         for constraint in &self.torn {
             is_torn[*constraint as usize] = true;
@@ -63,9 +87,5 @@ impl Plan {
             // Those of the spare.
             store.detach_tethers(self.model.particle_count());
         }
-        let new_tethers =
-            |basis| Tethers::new(&self.model, &self.parameters, basis, self.fields.tethers);
-        let tethers = self.tether_basis.map(new_tethers);
-        Prepared { store, tethers: tethers.unwrap_or_default(), model: self.model }
     }
 }

@@ -6,7 +6,7 @@ mod response;
 
 use correction::{Advanced, corrected};
 use glam::Vec3;
-use reaction::{BlockReaction, LaneContacts, LaneReaction, Reaction};
+use reaction::{BlockReaction, LaneContacts, LaneReaction, Reaction, ReactionRoom, Reactions};
 use response::{Contact, respond};
 
 use super::hit::{Hit, LaneHit};
@@ -28,6 +28,8 @@ pub(crate) struct Contacts {
     touched: Vec<usize>,
     groups: Vec<GroupContacts>,
     near_meshes: NearMeshes,
+    /// The reactions of all blocks of the worker.
+    pub(crate) reactions: Reactions,
 }
 
 /// Contacts of eight particles.
@@ -50,6 +52,7 @@ pub(crate) struct ContactRoom {
     pub(crate) block_length: usize,
     /// Number of particles that can be near a mesh; 0 in a scene without meshes.
     pub(crate) near_mesh_count: usize,
+    pub(crate) reactions: ReactionRoom,
 }
 
 /// A particle inside an obstacle.
@@ -71,23 +74,23 @@ impl Contacts {
             touched: Vec::with_capacity(count),
             groups: vec![GroupContacts::default(); count],
             near_meshes: NearMeshes::new(room.near_mesh_count),
+            reactions: Reactions::new(room.reactions),
         }
     }
 
-    /// Pushes free particles out of every obstacle, in order. Adds what they do to each collider to
-    /// `reactions`, which are by collider, or empty if nobody asks.
+    /// Pushes free particles out of every obstacle, in order.
     #[inline(always)]
     pub(crate) fn push_out<W: Wide>(
         &mut self,
         particles: &mut impl ParticleBlock,
         inputs: &SubstepInputs<'_>,
-        reactions: &mut [BlockReaction],
     ) {
         for obstacle in inputs.obstacles {
             if inputs.is_given_up() {
                 return;
             }
-            let reaction = reactions.get_mut(obstacle.collider);
+            let mut block = self.reactions.begin_block();
+            let reaction = block.as_mut();
             match &obstacle.solid {
                 Solid::HalfSpace(half_space) => {
                     self.push_groups_out::<W>(particles, (obstacle, half_space), reaction);
@@ -103,6 +106,9 @@ impl Contacts {
                     let reaction = reaction.map(|reaction| &mut reaction.single);
                     self.push_each_off::<W>(particles, (obstacle, mesh), inputs, reaction);
                 }
+            }
+            if let Some(block) = block {
+                self.reactions.add(obstacle.collider, &block);
             }
         }
     }

@@ -1,11 +1,14 @@
 //! Expansion of a scene: every particle, constraint and triangle.
 
+use std::sync::OnceLock;
+
 use super::definition::bending::{BendParticles, SceneBend};
 use super::definition::element::{SceneConstraint, SceneParticle};
 use super::definition::limits::Limits;
 use crate::constraints::Constraint;
 use crate::constraints::bends::Bend;
 use crate::constraints::families::Sheet;
+use crate::constraints::incidence::Incidence;
 use sim_types::Method;
 
 /// Every particle, constraint and triangle of a scene; immutable from load to load.
@@ -33,9 +36,16 @@ pub(crate) struct Model {
     pub(crate) is_without_contact: Vec<bool>,
     /// Meaning of the constraints' softness.
     pub(crate) method: Method,
+    incidence: OnceLock<Incidence>,
 }
 
 impl Model {
+    /// The constraints and bends of each particle. Found once, when forces are first measured.
+    pub(crate) fn incidence(&self) -> &Incidence {
+        let Self { particles, constraints, bends, .. } = self;
+        self.incidence.get_or_init(|| Incidence::new(particles.len(), constraints, bends))
+    }
+
     /// Creates a model with all particles of a scene.
     pub(crate) fn new(method: Method, particles: Vec<SceneParticle>) -> Self {
         let is_without_contact = vec![false; particles.len()];

@@ -8,7 +8,7 @@ use crate::contacts::contact::reaction::Reaction;
 use crate::scene::model::Model;
 use crate::state::particles::Particle;
 use crate::step::anchors::Anchors;
-use crate::store::{ParticleStore, Receivers};
+use crate::store::ParticleStore;
 
 /// The impulses of a step. A force is an impulse times the rate.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -89,24 +89,16 @@ impl Measurement {
         if self.is_located {
             return;
         }
-        let fixed = || {
-            let states = (0_u32..).zip(measured.states);
-            states.filter(|(_, one)| is_fixed(one.flags)).map(|(particle, _)| particle)
-        };
+        let states = (0_u32..).zip(measured.states);
+        let fixed = states.filter(|(_, one)| is_fixed(one.flags)).map(|(particle, _)| particle);
+        let fixed: Vec<_> = fixed.collect();
+        let impulse = |particle: &u32| ParticleImpulse { particle: *particle, impulse: [0.0; 3] };
         self.forces.particles.clear();
-        self.forces
-            .particles
-            .extend(fixed().map(|particle| ParticleImpulse { particle, impulse: [0.0; 3] }));
+        self.forces.particles.extend(fixed.iter().map(impulse));
         self.pulls.clear();
-        self.pulls.resize(self.forces.particles.len(), DVec3::ZERO);
-        let mut of_particles = vec![None; measured.states.len()];
-        for (index, particle) in (0..).zip(fixed()) {
-            of_particles[particle as usize] = Some(index);
-        }
-        let collider_count = self.reactions.len();
-        let receivers = Receivers { collider_count, of_particles: &of_particles };
+        self.pulls.resize(fixed.len(), DVec3::ZERO);
         let tethers = measured.tethers.ends();
-        store.measure_forces(measured.model, measured.states, &receivers, tethers);
+        store.measure_forces(measured.model, measured.states, &fixed, tethers);
         self.is_located = true;
     }
 

@@ -4,24 +4,21 @@ use super::particle_block::ParticleBlock;
 use super::stage::Stage;
 use super::substep::SubstepInputs;
 use crate::contacts::contact::Contacts;
-use crate::contacts::contact::reaction::BlockReaction;
 use crate::kernels::lanes::Wide;
 
 /// Runs one stage on a block of particles. `contacts` carries the contacts of the block from
-/// [`Stage::Contact`] to [`Stage::Advance`]. `reactions` are those of the block, by collider; empty if nobody
-/// asks for them.
+/// [`Stage::Contact`] to [`Stage::Advance`].
 #[inline(always)]
 pub(crate) fn run_stage<W: Wide>(
     stage: Stage,
     particles: &mut impl ParticleBlock,
     inputs: &SubstepInputs<'_>,
     contacts: &mut Contacts,
-    reactions: &mut [BlockReaction],
 ) {
     match stage {
         Stage::Predict => particles.predict::<W>(&inputs.prediction),
         Stage::Tether => particles.pull_to_roots::<W>(),
-        Stage::Contact => contacts.push_out::<W>(particles, inputs, reactions),
+        Stage::Contact => contacts.push_out::<W>(particles, inputs),
         Stage::Advance => {
             particles.advance::<W>();
             contacts.correct_touched::<W>(particles, inputs);

@@ -188,10 +188,10 @@ impl Crowd {
         is_marked
     }
 
-    /// Measures these pulls, and the reactions of colliders, in each further step.
-    pub(crate) fn measure_forces(&mut self, pulls: Vec<Pull>, collider_count: usize) {
+    /// Measures these pulls in each further step.
+    pub(crate) fn measure_forces(&mut self, pulls: Vec<Pull>) {
         let projection_count = self.rows.layout.rows * self.figures.pairs.len();
-        self.rows.measure_forces(Pulls::new(pulls, projection_count), collider_count);
+        self.rows.measure_forces(Pulls::new(pulls, projection_count));
     }
 
     /// Number of the projection of the constraint with an index of its location.

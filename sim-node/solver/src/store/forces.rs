@@ -4,10 +4,11 @@ use glam::DVec3;
 
 use super::graph::Graph;
 use super::graph::forces::Projections;
-use super::pulls::{Pull, Receivers, TetherEnds};
+use super::pulls::{Pull, TetherEnds};
 use super::rows::RowForces;
 use super::{Location, ParticleStore};
-use crate::contacts::contact::reaction::{BlockReaction, Reaction, ReactionSum};
+use crate::constraints::Constraint;
+use crate::contacts::contact::reaction::{Reaction, ReactionRoom, take_impulses};
 use crate::scene::model::Model;
 use crate::state::particles::Particle;
 
@@ -26,36 +27,53 @@ struct LinkPlace {
     projection: usize,
 }
 
+/// A fixed particle, and its index among those that are fixed.
+#[derive(Clone, Copy)]
+struct FixedParticle {
+    particle: u32,
+    receiver: usize,
+}
+
 impl ParticleStore {
-    /// Measures forces in each further step. Call it again when other particles are fixed, or when particles,
-    /// constraints or tethers have moved.
+    /// Measures forces on the fixed particles in each further step. Call it again when other particles are fixed, or
+    /// when particles, constraints or tethers have moved.
     pub(crate) fn measure_forces(
         &mut self,
         model: &Model,
         states: &[Particle],
-        receivers: &Receivers<'_>,
+        fixed: &[u32],
         tethers: impl Iterator<Item = TetherEnds>,
     ) {
         let projections = self.graph.projections();
         let mut in_graph = Vec::new();
         let mut in_rows = vec![Vec::new(); self.patches.len() + self.crowds.len()];
-        for link in self.links(model, &projections) {
-            let pulls = match link.place.rows {
-                None => &mut in_graph,
-                Some(rows) => &mut in_rows[rows],
-            };
-            self.push_pulls(&link, states, receivers, pulls);
+        let incidence = model.incidence();
+        for (receiver, particle) in fixed.iter().enumerate() {
+            for number in incidence.of(*particle) {
+                let link = self.link(model, &projections, *number);
+                let fixed = FixedParticle { particle: *particle, receiver };
+                let pulls = match link.place.rows {
+                    None => &mut in_graph,
+                    Some(rows) => &mut in_rows[rows],
+                };
+                pulls.extend(self.pull(&link, states, fixed));
+            }
         }
-        self.graph.measure_forces(in_graph, projections, receivers.collider_count);
+        self.graph.measure_forces(in_graph, projections);
         let mut in_rows = in_rows.into_iter();
         for (patch, pulls) in self.patches.iter_mut().zip(&mut in_rows) {
-            patch.measure_forces(pulls, receivers.collider_count);
+            patch.measure_forces(pulls);
         }
         for (crowd, pulls) in self.crowds.iter_mut().zip(in_rows) {
-            crowd.measure_forces(pulls, receivers.collider_count);
+            crowd.measure_forces(pulls);
+        }
+        let mut tethers = tethers.peekable();
+        let mut receivers = vec![None; tethers.peek().map_or(0, |_| states.len())];
+        if !receivers.is_empty() {
+            (0..).zip(fixed).for_each(|(index, one)| receivers[*one as usize] = Some(index));
         }
         for TetherEnds { particle, slot, root } in tethers {
-            let Some(receiver) = receivers.of_particles[root as usize] else { continue };
+            let Some(receiver) = receivers[root as usize] else { continue };
             let location = self.location(particle);
             let index = location.index();
             match self.rows_mut(location) {
@@ -67,6 +85,7 @@ impl ParticleStore {
 
     /// Measures no forces any longer.
     pub(crate) fn forget_forces(&mut self) {
+        self.measure_reactions(ReactionRoom::default());
         self.graph.forget_forces();
         for patch in &mut self.patches {
             patch.forget_forces();
@@ -76,37 +95,26 @@ impl ParticleStore {
         }
     }
 
+    /// Measures the reactions of colliders in each further step.
+    pub(crate) fn measure_reactions(&mut self, room: ReactionRoom) {
+        self.contact_room.reactions = room;
+        self.workers.reserve_reactions(room);
+    }
+
     /// Moves the numbers of contacts in a substep, by collider, to their totals.
     pub(crate) fn take_contacts(&mut self, totals: &mut [u32]) {
-        for block in self.reaction_blocks(totals.len()) {
-            for (total, reaction) in totals.iter_mut().zip(block) {
-                *total += std::mem::take(&mut reaction.single.contacts);
+        for worker in self.workers.reactions() {
+            for (collider, total) in totals.iter_mut().enumerate() {
+                *total += worker.take_contacts(collider);
             }
         }
     }
 
-    /// Moves the reactions of a step to those of the colliders, in the order of the particles' blocks.
+    /// Moves the reactions of a step to those of the colliders.
     pub(crate) fn take_reactions(&mut self, totals: &mut [Reaction]) {
-        let collider_count = totals.len();
         for (collider, total) in totals.iter_mut().enumerate() {
-            let mut sum = ReactionSum::default();
-            for block in self.reaction_blocks(collider_count) {
-                sum.take(&mut block[collider]);
-            }
-            sum.add_to(total);
+            take_impulses(self.workers.reactions(), collider, total);
         }
-    }
-
-    /// The reactions of each block, by collider.
-    fn reaction_blocks(
-        &mut self,
-        collider_count: usize,
-    ) -> impl Iterator<Item = &mut [BlockReaction]> {
-        let sheets = self.patches.iter_mut().map(|patch| &mut patch.rows);
-        let rows = sheets.chain(self.crowds.iter_mut().map(|crowd| &mut crowd.rows));
-        let in_rows = rows.map(|rows| &mut rows.forces.reactions);
-        let parts = std::iter::once(&mut self.graph.forces_mut().reactions).chain(in_rows);
-        parts.flat_map(move |part| part.chunks_exact_mut(collider_count.max(1)))
     }
 
     /// Moves the impulses of a step, times the length of a substep, to those of the fixed particles.
@@ -117,41 +125,43 @@ impl ParticleStore {
         }
     }
 
-    /// The constraints and bends of a scene.
-    fn links<'a>(
-        &'a self,
-        model: &'a Model,
-        projections: &'a Projections,
-    ) -> impl Iterator<Item = Link> + 'a {
-        let constraints = (0_u32..).zip(&model.families).map(|(constraint, family)| {
-            let [a, b] = model.pair(constraint);
-            let location = self.locations[constraint as usize];
-            Link {
-                particles: [a, b, a, a],
-                coefficients: [1.0, -1.0, 0.0, 0.0],
-                place: self.place_of(location, |row| match location.rows() {
-                    None => self.graph.projection_of_constraint(projections, location.index()),
-                    Some(rows) => match self.patches.get(rows) {
-                        Some(patch) => patch.projection_of_constraint(*family, row),
-                        None => self.crowds[rows - self.patches.len()]
-                            .projection_of_constraint(location.index()),
-                    },
-                }),
-            }
-        });
-        let bends = (0..).zip(&model.bends).zip(&model.bend_families);
-        let bends = bends.map(|((index, bend), family): ((usize, _), _)| {
-            let location = self.bends.locations[index];
-            Link {
-                particles: bend.particles,
-                coefficients: bend.coefficients,
-                place: self.place_of(location, |row| match location.rows() {
-                    None => self.graph.projection_of_bend(projections, location.index()),
-                    Some(sheet) => self.patches[sheet].projection_of_bend(*family, row),
-                }),
-            }
-        });
-        constraints.chain(bends)
+    /// A constraint or bend with this number in [`Incidence`](crate::constraints::incidence::Incidence).
+    fn link(&self, model: &Model, projections: &Projections, number: u32) -> Link {
+        let number = number as usize;
+        match number.checked_sub(model.constraints.len()) {
+            None => self.constraint_link(model, projections, number),
+            Some(bend) => self.bend_link(model, projections, bend),
+        }
+    }
+
+    fn constraint_link(&self, model: &Model, projections: &Projections, constraint: usize) -> Link {
+        let Constraint { a, b, .. } = model.constraints[constraint];
+        let location = self.locations[constraint];
+        Link {
+            particles: [a, b, a, a],
+            coefficients: [1.0, -1.0, 0.0, 0.0],
+            place: self.place_of(location, |row| match location.rows() {
+                None => self.graph.projection_of_constraint(projections, location.index()),
+                Some(rows) => match self.patches.get(rows) {
+                    Some(patch) => patch.projection_of_constraint(model.families[constraint], row),
+                    None => self.crowds[rows - self.patches.len()]
+                        .projection_of_constraint(location.index()),
+                },
+            }),
+        }
+    }
+
+    fn bend_link(&self, model: &Model, projections: &Projections, index: usize) -> Link {
+        let (bend, family) = (&model.bends[index], model.bend_families[index]);
+        let location = self.bends.locations[index];
+        Link {
+            particles: bend.particles,
+            coefficients: bend.coefficients,
+            place: self.place_of(location, |row| match location.rows() {
+                None => self.graph.projection_of_bend(projections, location.index()),
+                Some(sheet) => self.patches[sheet].projection_of_bend(family, row),
+            }),
+        }
     }
 
     /// Place of a constraint or bend, where `projection` tells its number for the row in which it begins.
@@ -160,31 +170,21 @@ impl ParticleStore {
         LinkPlace { rows: location.rows(), projection: projection(row) }
     }
 
-    /// Pushes a pull for each fixed particle of a constraint or bend.
-    fn push_pulls(
-        &self,
-        link: &Link,
-        states: &[Particle],
-        receivers: &Receivers<'_>,
-        pulls: &mut Vec<Pull>,
-    ) {
+    /// The pull of a constraint or bend on one of its particles, which is fixed. None if all are fixed.
+    fn pull(&self, link: &Link, states: &[Particle], fixed: FixedParticle) -> Option<Pull> {
         let ends = || {
             let all = link.particles.iter().zip(link.coefficients);
             all.filter(|(_, coefficient)| *coefficient != 0.0)
         };
         let inverse_mass = |particle: u32| states[particle as usize].inverse_mass;
-        let Some((free, share)) = ends().find(|(one, _)| inverse_mass(**one) > 0.0) else { return };
-        let fixed = ends().filter_map(|(particle, coefficient)| {
-            Some((receivers.of_particles[*particle as usize]?, coefficient))
-        });
-        for (receiver, coefficient) in fixed {
-            pulls.push(Pull {
-                projection: link.place.projection,
-                at: self.displacement_place(*free),
-                receiver: receiver as usize,
-                factor: coefficient / share / inverse_mass(*free),
-            });
-        }
+        let (free, share) = ends().find(|(one, _)| inverse_mass(**one) > 0.0)?;
+        let (_, coefficient) = ends().find(|(one, _)| **one == fixed.particle)?;
+        Some(Pull {
+            projection: link.place.projection,
+            at: self.displacement_place(*free),
+            receiver: fixed.receiver,
+            factor: coefficient / share / inverse_mass(*free),
+        })
     }
 
     /// Where the x displacement of a particle is among the numbers of the graph or its sheet.

@@ -284,8 +284,6 @@ impl Graph {
             tethers: &self.tethers,
             tether_count: self.layout.scene.tethers,
             tether_pulls: &mut self.forces.tether_pulls,
-            reaction_count: self.forces.reaction_count,
-            reactions: &mut self.forces.reactions,
         };
         let parts = all.chunks(length).map(Some);
         let work = |part: &mut Option<GraphBlock<'_>>, scratch: &mut WorkerScratch| {

@@ -188,13 +188,6 @@ impl Numbers<'_> {
     }
 }
 
-/// The colliders and fixed particles on which forces are measured.
-pub(crate) struct Receivers<'a> {
-    pub(crate) collider_count: usize,
-    /// By particle: its index among the fixed ones.
-    pub(crate) of_particles: &'a [Option<u32>],
-}
-
 /// A tether as the store knows it.
 pub(crate) struct TetherEnds {
     pub(crate) particle: u32,

@@ -2,6 +2,7 @@
 
 use crate::constraints::bends::block::BendBlock;
 use crate::constraints::projection_block::ProjectionBlock;
+use crate::contacts::contact::reaction::{ReactionRoom, Reactions};
 use crate::contacts::contact::{ContactRoom, Contacts};
 use crate::kernels::Kernels;
 use crate::kernels::worker_pool::{WORKERS_MAX, WorkerPool};
@@ -55,6 +56,18 @@ impl Workers {
         for scratch in &mut self.scratches {
             scratch.contacts = Contacts::new(room);
         }
+    }
+
+    /// Makes room for reactions, or forgets them.
+    pub(crate) fn reserve_reactions(&mut self, room: ReactionRoom) {
+        for scratch in &mut self.scratches {
+            scratch.contacts.reactions = Reactions::new(room);
+        }
+    }
+
+    /// The reactions that each worker has summed.
+    pub(crate) fn reactions(&mut self) -> impl Iterator<Item = &mut Reactions> {
+        self.scratches.iter_mut().map(|scratch| &mut scratch.contacts.reactions)
     }
 
     /// Scratch memory of the calling thread.

@@ -38,40 +38,111 @@ impl Reaction {
     }
 }
 
-/// Sums over the contacts of a row or block of particles with a collider in a step.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct BlockReaction {
-    /// Of contacts that are handled one by one. It also counts all contacts of the substep.
-    pub(crate) single: Reaction,
+/// The contacts of a row or block of particles with a collider in a substep.
+#[derive(Debug, Default)]
+pub(super) struct BlockReaction {
+    /// Of contacts that are handled one by one. It also counts all contacts.
+    pub(super) single: Reaction,
     /// Of contacts that are handled eight at a time, linear and angular, in the units of [`Reaction`].
     lanes: [[Lanes8; 3]; 2],
 }
 
-/// The sum of block reactions, lane by lane.
-#[derive(Debug, Default)]
-pub(crate) struct ReactionSum {
-    single: Reaction,
-    lanes: [[[f64; 8]; 3]; 2],
+/// The reactions that a worker has summed, by collider.
+///
+/// Workers come to the blocks in any order. So the sums are whole numbers of a small unit, whose sum is the same in
+/// every order.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Reactions {
+    /// Units in a kg m, and in a kg m^2.
+    scale: f64,
+    /// Empty while nobody asks for forces.
+    sums: Vec<WholeReaction>,
 }
 
-impl ReactionSum {
-    /// Takes a block's impulses, not its contacts.
-    pub(crate) fn take(&mut self, block: &mut BlockReaction) {
-        let BlockReaction { single, lanes } = std::mem::take(block);
-        self.single.add_substep(&single);
-        let sums = self.lanes.as_flattened_mut().as_flattened_mut();
-        for (sum, lane) in sums.iter_mut().zip(lanes.as_flattened().as_flattened()) {
-            *sum += f64::from(*lane);
-        }
+/// Memory for reactions.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(crate) struct ReactionRoom {
+    /// 0 while nobody asks for forces.
+    pub(crate) collider_count: usize,
+    /// Largest mass of a particle.
+    pub(crate) mass_max: f64,
+}
+
+/// Units in the product of the largest mass and a meter: contacts that move it by 1e-6 m in a substep are exact to
+/// 1e-15, and the sums have room for 1e16 m.
+const UNITS_PER_MASS: f64 = (1_u128 << 72) as f64;
+
+/// A [`Reaction`] in whole units.
+#[derive(Debug, Clone, Copy, Default)]
+struct WholeReaction {
+    linear: [i128; 3],
+    angular: [i128; 3],
+    contacts: u32,
+}
+
+impl Reactions {
+    pub(crate) fn new(room: ReactionRoom) -> Self {
+        // A power of two, so that a division by it is exact.
+        let power_of_two = f64::from_bits(room.mass_max.to_bits() & f64::INFINITY.to_bits());
+        let sums = vec![WholeReaction::default(); room.collider_count];
+        Self { scale: UNITS_PER_MASS / power_of_two, sums }
     }
 
-    /// Adds the impulses to those of a reaction.
-    pub(crate) fn add_to(&self, total: &mut Reaction) {
-        let [linear, angular] = self
-            .lanes
-            .map(|sums| DVec3::from_array(map_axes(sums, |lanes| lanes.into_iter().sum())));
-        total.linear += self.single.linear + linear;
-        total.angular += self.single.angular + angular;
+    /// Returns the reaction of a block before its contacts; `None` if nobody asks.
+    #[inline(always)]
+    pub(super) fn begin_block(&self) -> Option<BlockReaction> {
+        (!self.sums.is_empty()).then(BlockReaction::default)
+    }
+
+    /// Adds the contacts of a block.
+    pub(super) fn add(&mut self, collider: usize, block: &BlockReaction) {
+        let BlockReaction { single, lanes } = block;
+        if single.contacts == 0 {
+            return;
+        }
+        let [linear, angular] = lanes.map(|lanes| {
+            let sum = |lanes: Lanes8| lanes.into_iter().map(f64::from).sum();
+            DVec3::from_array(map_axes(lanes, sum))
+        });
+        let whole = &mut self.sums[collider];
+        whole.contacts += single.contacts;
+        add_whole(&mut whole.linear, (single.linear + linear) * self.scale);
+        add_whole(&mut whole.angular, (single.angular + angular) * self.scale);
+    }
+
+    /// Moves the number of contacts with a collider since the last call.
+    pub(crate) fn take_contacts(&mut self, collider: usize) -> u32 {
+        std::mem::take(&mut self.sums[collider].contacts)
+    }
+}
+
+/// Moves the impulses that all workers have summed for a collider to its reaction.
+pub(crate) fn take_impulses<'a>(
+    workers: impl Iterator<Item = &'a mut Reactions>,
+    collider: usize,
+    total: &mut Reaction,
+) {
+    let (mut sum, mut scale) = (WholeReaction::default(), 1.0);
+    for worker in workers {
+        let WholeReaction { linear, angular, .. } = std::mem::take(&mut worker.sums[collider]);
+        for (sum, more) in sum.linear.iter_mut().zip(linear) {
+            *sum = sum.wrapping_add(more);
+        }
+        for (sum, more) in sum.angular.iter_mut().zip(angular) {
+            *sum = sum.wrapping_add(more);
+        }
+        scale = worker.scale;
+    }
+    total.linear += DVec3::from_array(sum.linear.map(|units| units as f64)) / scale;
+    total.angular += DVec3::from_array(sum.angular.map(|units| units as f64)) / scale;
+}
+
+/// Adds numbers of units, rounded towards zero. One that is not finite, or beyond all colliders' reach, saturates.
+fn add_whole(sums: &mut [i128; 3], units: DVec3) {
+    for (sum, units) in sums.iter_mut().zip(units.to_array()) {
+        #[allow(clippy::cast_possible_truncation, reason = "rounds and saturates, as it should")]
+        let units = units as i128;
+        *sum = sum.wrapping_add(units);
     }
 }
 

@@ -5,7 +5,6 @@ use crate::constraints::columns::{ConstraintColumns, FullPass};
 use crate::constraints::fields::Pass;
 use crate::constraints::parameters::PassSoftness;
 use crate::constraints::projection::Projection;
-use crate::contacts::contact::reaction::BlockReaction;
 use crate::kernels::lanes::{LaneWork, Wide};
 use crate::step::particle_stages::run_stage;
 use crate::step::schedule::{Schedule, ScheduledStage};
@@ -25,8 +24,6 @@ pub(crate) struct Blocks<'a> {
     layout: &'a RowLayout,
     figures: &'a Figures,
     pulls: PullsPart<'a>,
-    reactions: &'a mut [BlockReaction],
-    reaction_count: usize,
     tether_pulls: &'a mut [TetherPulls],
     tether_length: usize,
 }
@@ -36,16 +33,13 @@ impl<'a> Blocks<'a> {
         figures: &'a Figures,
         (layout, numbers, forces): (&'a RowLayout, &'a mut [f32], &'a mut RowForces),
     ) -> Self {
-        let RowForces { pulls, reactions, reaction_count, tether_pulls, tether_length, .. } =
-            forces;
+        let RowForces { pulls, tether_pulls, tether_length, .. } = forces;
         Self {
             numbers,
             first: 0,
             layout,
             figures,
             pulls: pulls.whole(),
-            reactions,
-            reaction_count: *reaction_count,
             tether_pulls,
             tether_length: *tether_length,
         }
@@ -66,27 +60,24 @@ impl<'a> Blocks<'a> {
     }
 
     fn split_at(self, count: usize) -> (Self, Self) {
-        let Self { first, layout, figures, reaction_count, tether_length, .. } = self;
+        let Self { first, layout, figures, tether_length, .. } = self;
         let next = first + count;
         let (numbers, other_numbers) = self.numbers.split_at_mut(count * layout.length);
         let (pulls, other_pulls) = self.pulls.split_at(next * figures.pairs.len());
-        let (reactions, other_reactions) = self.reactions.split_at_mut(count * reaction_count);
         let (tether_pulls, other_tether_pulls) =
             self.tether_pulls.split_at_mut(count * tether_length);
-        let part = |first, numbers, pulls, reactions, tether_pulls| Self {
+        let part = |first, numbers, pulls, tether_pulls| Self {
             numbers,
             first,
             layout,
             figures,
             pulls,
-            reactions,
-            reaction_count,
             tether_pulls,
             tether_length,
         };
         (
-            part(first, numbers, pulls, reactions, tether_pulls),
-            part(next, other_numbers, other_pulls, other_reactions, other_tether_pulls),
+            part(first, numbers, pulls, tether_pulls),
+            part(next, other_numbers, other_pulls, other_tether_pulls),
         )
     }
 }
@@ -167,12 +158,11 @@ impl Blocks<'_> {
         sweep: &BlockSweep<'_>,
         scratch: &mut WorkerScratch,
     ) {
-        let Self { layout, reaction_count, tether_length, .. } = *self;
+        let Self { layout, tether_length, .. } = *self;
         let numbers = &mut self.numbers[block * layout.length..][..layout.length];
-        let reactions = &mut self.reactions[block * reaction_count..][..reaction_count];
         let tether_pulls = &mut self.tether_pulls[block * tether_length..][..tether_length];
         let mut particles = RowParticles::new(numbers, layout, self.first + block, tether_pulls);
-        run_stage::<W>(stage, &mut particles, sweep.inputs, &mut scratch.contacts, reactions);
+        run_stage::<W>(stage, &mut particles, sweep.inputs, &mut scratch.contacts);
     }
 
     #[inline(always)]

@@ -5,7 +5,6 @@ use glam::Vec3;
 use crate::constraints::separation::RestLength;
 use crate::constraints::tether_pull::{Tethered, tether_excess};
 use crate::contacts::contact::Contacts;
-use crate::contacts::contact::reaction::BlockReaction;
 use crate::contacts::path::{LanePath, SubstepPath};
 use crate::kernels::lanes::{LaneWork, Lanes8, PackedParticle, Wide};
 use crate::kernels::vectors::{lane_of, load, store};
@@ -43,10 +42,6 @@ pub(crate) struct GraphBlock<'a> {
     /// By particle and tether, or empty if nobody asks for forces: mass times the displacement that the tether has
     /// taken in this step.
     pub(crate) tether_pulls: &'a mut [[f32; 3]],
-    /// By [`BLOCK_GROUPS`] groups, then by collider; empty if nobody asks for forces.
-    pub(crate) reactions: &'a mut [BlockReaction],
-    /// Number of reactions of a block.
-    pub(crate) reaction_count: usize,
 }
 
 impl<'a> GraphBlock<'a> {
@@ -63,7 +58,7 @@ impl<'a> GraphBlock<'a> {
 
     /// Splits after `count` groups, or at the end if there are fewer.
     fn split_at(self, count: usize) -> (GraphBlock<'a>, GraphBlock<'a>) {
-        let Self { tether_count, reaction_count, .. } = self;
+        let Self { tether_count, .. } = self;
         let end = |length: usize, wanted: usize| wanted.min(length);
         let (particles, other_particles) =
             self.particles.split_at_mut(end(self.particles.len(), count));
@@ -74,9 +69,6 @@ impl<'a> GraphBlock<'a> {
             self.tethers.split_at(end(self.tethers.len(), 8 * tether_count * count));
         let (tether_pulls, other_tether_pulls) =
             self.tether_pulls.split_at_mut(end(self.tether_pulls.len(), 8 * tether_count * count));
-        let reactions_end = reaction_count * count.div_ceil(BLOCK_GROUPS);
-        let (reactions, other_reactions) =
-            self.reactions.split_at_mut(end(self.reactions.len(), reactions_end));
         let other = GraphBlock {
             first: self.first + 8 * particles.len(),
             particles: other_particles,
@@ -85,8 +77,6 @@ impl<'a> GraphBlock<'a> {
             tethers: other_tethers,
             tether_count,
             tether_pulls: other_tether_pulls,
-            reactions: other_reactions,
-            reaction_count,
         };
         let first = GraphBlock {
             first: self.first,
@@ -96,8 +86,6 @@ impl<'a> GraphBlock<'a> {
             tethers,
             tether_count,
             tether_pulls,
-            reactions,
-            reaction_count,
         };
         (first, other)
     }
@@ -116,9 +104,8 @@ impl LaneWork for BlockWork<'_, '_> {
 
     #[inline(always)]
     fn run<W: Wide>(mut self) {
-        let reactions = std::mem::take(&mut self.block.reactions);
         for ScheduledStage { stage, .. } in self.stages {
-            run_stage::<W>(*stage, &mut self.block, self.inputs, self.contacts, reactions);
+            run_stage::<W>(*stage, &mut self.block, self.inputs, self.contacts);
         }
     }
 }

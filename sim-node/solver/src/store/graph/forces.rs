@@ -1,7 +1,6 @@
 //! Forces of the particles of the graph on colliders and fixed particles.
 
 use super::group::ConstraintGroup;
-use crate::contacts::contact::reaction::BlockReaction;
 use crate::kernels::lanes::PackedParticle;
 use crate::store::pulls::{Numbers, Pulls};
 
@@ -10,10 +9,6 @@ use crate::store::pulls::{Numbers, Pulls};
 pub(crate) struct GraphForces {
     pub(crate) pulls: Pulls,
     pub(crate) projections: Projections,
-    /// By block, then by collider.
-    pub(crate) reactions: Vec<BlockReaction>,
-    /// Number of reactions of a block.
-    pub(crate) reaction_count: usize,
     /// By particle and tether: mass times the displacement that the tether has taken.
     pub(crate) tether_pulls: Vec<[f32; 3]>,
     /// By particle and tether: index of the root among the fixed particles.

@@ -3,10 +3,8 @@
 use glam::DVec3;
 
 use super::Graph;
-use super::block::BLOCK_GROUPS;
 use super::forces::{GraphForces, Projections};
 use super::group::ConstraintGroup;
-use crate::contacts::contact::reaction::BlockReaction;
 use crate::store::pulls::{Pull, Pulls};
 
 impl Graph {
@@ -15,19 +13,11 @@ impl Graph {
         Projections::new(&self.groups, &self.bends.groups)
     }
 
-    /// Measures these pulls, and the reactions of colliders, in each further step.
-    pub(crate) fn measure_forces(
-        &mut self,
-        pulls: Vec<Pull>,
-        projections: Projections,
-        collider_count: usize,
-    ) {
-        let block_count = self.group_count().div_ceil(BLOCK_GROUPS);
+    /// Measures these pulls in each further step.
+    pub(crate) fn measure_forces(&mut self, pulls: Vec<Pull>, projections: Projections) {
         self.forces = GraphForces {
             pulls: Pulls::new(pulls, projections.count),
             projections,
-            reaction_count: collider_count,
-            reactions: vec![BlockReaction::default(); block_count * collider_count],
             tether_pulls: vec![[0.0; 3]; self.tethers.len()],
             tether_receivers: vec![None; self.tethers.len()],
         };
@@ -35,10 +25,6 @@ impl Graph {
 
     pub(crate) fn forget_forces(&mut self) {
         self.forces = GraphForces::default();
-    }
-
-    pub(crate) fn forces_mut(&mut self) -> &mut GraphForces {
-        &mut self.forces
     }
 
     /// Sets the root of a tether.

@@ -167,12 +167,12 @@ impl Band<'_> {
         }
         let (layout, length) = (self.layout, self.layout.length);
         let numbers = &mut self.numbers[(row - self.first) * length..][..length];
-        let is_measured = IS_MEASURED && matches!(scheduled.stage, Stage::Tether | Stage::Contact);
-        let (reactions, tether_pulls): (&mut [_], &mut [_]) =
-            if is_measured { self.forces.of_row(row) } else { (&mut [], &mut []) };
+        let is_measured = IS_MEASURED && scheduled.stage == Stage::Tether;
+        let tether_pulls: &mut [_] =
+            if is_measured { self.forces.tether_pulls(row) } else { &mut [] };
         let mut row = RowParticles::new(numbers, layout, row, tether_pulls);
         let contacts = &mut sweep.scratch.contacts;
-        run_stage::<W>(scheduled.stage, &mut row, sweep.inputs, contacts, reactions);
+        run_stage::<W>(scheduled.stage, &mut row, sweep.inputs, contacts);
         false
     }
 

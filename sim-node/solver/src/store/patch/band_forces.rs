@@ -2,7 +2,6 @@
 
 use std::ops::Range;
 
-use crate::contacts::contact::reaction::BlockReaction;
 use crate::kernels::lent_slice::LentSlice;
 use crate::store::pulls::{LentPulls, PullsPart};
 use crate::store::rows::RowForces;
@@ -17,12 +16,9 @@ pub(crate) struct BandForces<'a> {
     pull_masks: &'a [u32],
     /// Number of projections in a row.
     pull_groups: usize,
-    /// Number of reactions of a row.
-    reaction_count: usize,
     /// Number of tether pulls of a row.
     tether_length: usize,
     pub(crate) pulls: PullsPart<'a>,
-    reactions: &'a mut [BlockReaction],
     tether_pulls: &'a mut [TetherPulls],
 }
 
@@ -33,12 +29,9 @@ pub(crate) struct LentForces<'a> {
     pull_masks: &'a [u32],
     /// Number of projections in a row.
     pull_groups: usize,
-    /// Number of reactions of a row.
-    reaction_count: usize,
     /// Number of tether pulls of a row.
     tether_length: usize,
     pulls: LentPulls<'a>,
-    reactions: LentSlice<'a, BlockReaction>,
     tether_pulls: LentSlice<'a, TetherPulls>,
 }
 
@@ -49,15 +42,12 @@ impl<'a> LentForces<'a> {
         pull_masks: &'a [u32],
         pull_groups: usize,
     ) -> Self {
-        let RowForces { pulls, reactions, reaction_count, tether_pulls, tether_length, .. } =
-            forces;
+        let RowForces { pulls, tether_pulls, tether_length, .. } = forces;
         Self {
             pull_masks,
             pull_groups,
-            reaction_count: *reaction_count,
             tether_length: *tether_length,
             pulls: pulls.lend(),
-            reactions: LentSlice::new(reactions),
             tether_pulls: LentSlice::new(tether_pulls),
         }
     }
@@ -68,22 +58,18 @@ impl<'a> LentForces<'a> {
     /// As for [`LentSlice::part`], with rows as elements.
     #[allow(unsafe_code, reason = "lends on")]
     pub(crate) unsafe fn rows(&self, rows: Range<usize>) -> BandForces<'_> {
-        let Self { pull_masks, pull_groups, reaction_count, tether_length, .. } = *self;
+        let Self { pull_masks, pull_groups, tether_length, .. } = *self;
         let of_rows = |count: usize| rows.start * count..rows.end * count;
         // SAFETY: no two rows share a projection, and the caller has these rows.
         let pulls = unsafe { self.pulls.part(of_rows(pull_groups)) };
-        // SAFETY: as above.
-        let reactions = unsafe { self.reactions.part(of_rows(reaction_count)) };
         // SAFETY: as above.
         let tether_pulls = unsafe { self.tether_pulls.part(of_rows(tether_length)) };
         BandForces {
             first: rows.start,
             pull_masks,
             pull_groups,
-            reaction_count,
             tether_length,
             pulls,
-            reactions,
             tether_pulls,
         }
     }
@@ -102,13 +88,9 @@ impl BandForces<'_> {
         self.pull_masks[row] >> group & 1 != 0
     }
 
-    /// The reactions and the tether pulls of a row.
+    /// The tether pulls of a row.
     #[inline(always)]
-    pub(crate) fn of_row(&mut self, row: usize) -> (&mut [BlockReaction], &mut [TetherPulls]) {
-        let row = row - self.first;
-        (
-            &mut self.reactions[row * self.reaction_count..][..self.reaction_count],
-            &mut self.tether_pulls[row * self.tether_length..][..self.tether_length],
-        )
+    pub(crate) fn tether_pulls(&mut self, row: usize) -> &mut [TetherPulls] {
+        &mut self.tether_pulls[(row - self.first) * self.tether_length..][..self.tether_length]
     }
 }

@@ -6,14 +6,14 @@ use crate::store::pulls::{Pull, Pulls};
 use crate::store::rows::RowForces;
 
 impl Patch {
-    /// Measures these pulls, and the reactions of colliders, in each further step.
-    pub(crate) fn measure_forces(&mut self, pulls: Vec<Pull>, collider_count: usize) {
+    /// Measures these pulls in each further step.
+    pub(crate) fn measure_forces(&mut self, pulls: Vec<Pull>) {
         let (rows, count) = (self.rows.layout.rows, self.layout.pull_groups());
         let pulls = Pulls::new(pulls, rows * count);
         let mask =
             |row| (0..count).fold(0, |mask, n| mask | u32::from(pulls.has(row * count + n)) << n);
         self.pull_masks = (0..rows).map(mask).collect();
-        self.rows.measure_forces(pulls, collider_count);
+        self.rows.measure_forces(pulls);
     }
 
     pub(crate) fn forget_forces(&mut self) {

@@ -1,7 +1,6 @@
 //! Forces of the particles of rows on colliders and fixed particles.
 
 use super::particles::TetherPulls;
-use crate::contacts::contact::reaction::BlockReaction;
 use crate::store::pulls::Pulls;
 
 /// The forces of rows. Empty while nobody asks for them.
@@ -9,10 +8,6 @@ use crate::store::pulls::Pulls;
 pub(crate) struct RowForces {
     pub(crate) is_measured: bool,
     pub(crate) pulls: Pulls,
-    /// By row, then by collider.
-    pub(crate) reactions: Vec<BlockReaction>,
-    /// Number of reactions of a row.
-    pub(crate) reaction_count: usize,
     /// By row, tether and eight columns: the displacements that tethers have taken in this step.
     pub(crate) tether_pulls: Vec<TetherPulls>,
     /// Number of tether pulls of a row.

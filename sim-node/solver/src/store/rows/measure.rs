@@ -6,20 +6,17 @@ use super::Rows;
 use super::forces::RowForces;
 use super::layout::RowLayout;
 use super::particles::TetherPulls;
-use crate::contacts::contact::reaction::BlockReaction;
 use crate::kernels::lanes::{Lanes8, axes, lane_groups};
 use crate::store::pulls::Pulls;
 
 impl Rows {
-    /// Measures these pulls, and the reactions of colliders, in each further step. No tether has a root yet.
-    pub(crate) fn measure_forces(&mut self, pulls: Pulls, collider_count: usize) {
+    /// Measures these pulls in each further step. No tether has a root yet.
+    pub(crate) fn measure_forces(&mut self, pulls: Pulls) {
         let RowLayout { rows, columns, ref fields, .. } = self.layout;
         let tether_length = fields.scene.tethers * columns.div_ceil(8);
         self.forces = RowForces {
             is_measured: true,
             pulls,
-            reactions: vec![BlockReaction::default(); rows * collider_count],
-            reaction_count: collider_count,
             tether_pulls: vec![[[0.0; 8]; 3]; rows * tether_length],
             tether_length,
             tether_receivers: vec![[None; 8]; rows * tether_length],
