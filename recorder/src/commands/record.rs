@@ -14,12 +14,13 @@ mod split;
 mod stop_reason;
 mod writing;
 
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
 use anyhow::{anyhow, bail};
-use recorder::{PartFile, Topic};
+use recorder::{Existing, PartFile, Topic};
 use sim_contract::clock::{SECOND_NS, monotonic_ns, realtime_ns, sleep_until};
 use sim_contract::{
     AttachError, Domain, Endpoint, LockstepError, NodeAnswer, OwnerState, SNAPSHOTS_BUFFERED, Stop,
@@ -27,7 +28,6 @@ use sim_contract::{
 };
 
 use crate::cli::exit::{self, Exit};
-use crate::cli::file_args::default_path;
 use crate::cli::output;
 pub(crate) use args::{RecordArgs, SingleStateArgs};
 use feed::Feed;
@@ -44,6 +44,7 @@ use stop_reason::StopReason;
 use writing::WriteOptions;
 use writing::black_box::BlackBox;
 use writing::extras::Extras;
+use writing::names::FileNames;
 
 /// Longest wait for messages before the next check for signals.
 const WAIT_MAX: Duration = Duration::from_millis(50);
@@ -63,17 +64,13 @@ pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
     let stop = Stop::install()?;
     report_bus_errors()?;
     let endpoint = args.endpoint.endpoint()?;
-    let names = args.names(default_path(endpoint.name(), realtime_ns()));
     let extras = Extras::open(&args.extras)?;
-    let (names, earlier_count) = match args.black_box {
-        // It goes on after a restart, and replaces no file of an earlier event.
-        Some(_) => (names.after_earlier_files(), 0),
-        None => (names.clone(), names.check(args.file.existing())?),
-    };
+    let (names, ring_files) = names(args, &endpoint)?;
     // Before the wait for a node, because SIGUSR1 would end the process.
     let signal = UserSignal::install()?;
     let trigger = args.black_box.map(|span| Trigger::new(span, signal.clone()));
     PartFile::check(&names.path(0), args.file.existing())?;
+    check_reserve(args, &names)?;
     let Some(mut tap) = attach(args, &endpoint, &stop)? else {
         bail!("nothing was recorded: no node has come up as {endpoint}");
     };
@@ -87,6 +84,7 @@ pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
         file: args.file.clone(),
         names,
         ring: args.split.ring(),
+        earlier: ring_files,
         is_synced: !args.no_sync,
         flush_interval: args.flush_interval,
         extras,
@@ -94,7 +92,6 @@ pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
     };
     let mut file = Some(options.create(0)?);
     let path = output::path_text(&options.names.path(0));
-    warn_of_earlier_files(earlier_count, &path);
     match args.black_box {
         Some(span) => {
             // That it can be created is known now. It is created with the first event.
@@ -112,7 +109,7 @@ pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
     let intake = Intake::new(args.steps);
     let writing = writing::start(Arc::clone(&queue), Arc::clone(&position), options, file)?;
     let live = LiveLine::new(Arc::clone(&queue), Arc::clone(&position), args.progress);
-    let feed = Feed::new(intake, Arc::clone(&queue), position, args.split.clone());
+    let feed = Feed::new(intake, Arc::clone(&queue), Arc::clone(&position), args.split.clone());
     let mut recording = Recording {
         tap,
         feed: feed
@@ -122,6 +119,7 @@ pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
             .triggered_by(trigger, args.queue_bytes),
         live,
         queue,
+        position,
         writing,
         next_owner_check_ns: 0,
         is_owner_alive: true,
@@ -134,13 +132,38 @@ pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
     Ok(if report.is_complete() { Exit::Done } else { Exit::Loss })
 }
 
-fn warn_of_earlier_files(count: usize, path: &str) {
+/// Returns the names of the files, and the files of a ring that it continues.
+fn names(args: &RecordArgs, endpoint: &Endpoint) -> anyhow::Result<(FileNames, Vec<PathBuf>)> {
+    let names = args.names(endpoint.name(), realtime_ns());
+    // It replaces no file of an earlier event.
+    let is_black_box = args.black_box.is_some();
+    if args.is_ring() && (is_black_box || args.file.existing() == Existing::Refuse) {
+        return names.after_ring();
+    }
+    if is_black_box {
+        return Ok((names.after_earlier_files().0, Vec::new()));
+    }
+    let count = names.check(args.file.existing())?;
     if count > 0 {
+        let path = output::path_text(&names.path(0));
         output::note(&format!(
             "warning: {count} files of an earlier recording are beside {path}; each stays until a file with its \
              number begins"
         ));
     }
+    Ok((names, Vec::new()))
+}
+
+/// Refuses to begin a single file on a disk without its reserve.
+fn check_reserve(args: &RecordArgs, names: &FileNames) -> anyhow::Result<()> {
+    let path = names.path(0);
+    if names.is_single() && args.split.ring().is_short(&path) {
+        let path = output::path_text(&path);
+        bail!(
+            "{path}: less than --min-free is free on its disk; free space, or choose another folder"
+        );
+    }
+    Ok(())
 }
 
 /// Attaches to the node. With `--wait`, waits for one until a signal or the end of `--duration`, and
@@ -184,6 +207,7 @@ struct Recording {
     feed: Feed,
     live: LiveLine,
     queue: Arc<Queue>,
+    position: Arc<WritePosition>,
     writing: JoinHandle<anyhow::Result<Written>>,
     next_owner_check_ns: u64,
     is_owner_alive: bool,
@@ -229,6 +253,8 @@ impl Recording {
             Some(StopReason::Signal)
         } else if self.queue.is_closed() {
             Some(StopReason::WriteError)
+        } else if self.position.ends_for_reserve() {
+            Some(StopReason::Reserve)
         } else if self.feed.is_time_over(now_ns) {
             Some(StopReason::Duration)
         } else {
@@ -279,7 +305,9 @@ impl Recording {
         output::end_live();
         self.feed.end_file(stop_reason.clone());
         self.queue.close();
-        let written = self.writing.join().map_err(|_| anyhow!("the writing thread panicked"))??;
+        let mut written =
+            self.writing.join().map_err(|_| anyhow!("the writing thread panicked"))??;
+        written.add_undeclared(&self.feed.undeclared());
         let reason = result?;
         if !args.follows()
             && let Some(hint) = reason.hint()

@@ -1,5 +1,7 @@
 //! The units of systemd: their command lines work, and systemd accepts them.
 
+use std::path::Path;
+
 use integration_tests::{Process, Program, Sandbox, ctl};
 
 const NODE: &str = include_str!("../../../packaging/systemd/catenary@.service");
@@ -31,6 +33,14 @@ fn the_command_lines_of_the_units_run_a_node_and_record_it() {
     assert!(
         Process::run(Program::Recorder, &sandbox, &verified).success().contains("bit-identical")
     );
+    // After a restart, the ring goes on.
+    let mut recorder = Process::start(Program::Recorder, &sandbox, &args);
+    recorder.wait_for_line("the ring goes on after ");
+    let node = Process::start_ready(Program::SimNode, &sandbox, &arguments(NODE, "sim-node"));
+    recorder.wait_for_line("recording from step ");
+    node.interrupt().success();
+    recorder.interrupt().recorded();
+    assert!(Path::new(&sandbox.path("run_0001.mcap")).exists());
 }
 
 #[test]

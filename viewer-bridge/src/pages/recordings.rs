@@ -213,6 +213,7 @@ impl Recordings {
             StopReason::OwnerGone => "the recording ended with the node",
             StopReason::NewRun => "the recording ended because another run began",
             StopReason::NewLoad => "the recording ended because another scene was loaded",
+            StopReason::Reserve => "the recording ended because less than 1 GB is free on its disk",
             StopReason::Other => "the recording ended by itself",
         }
         .to_owned()

@@ -11,7 +11,7 @@ use super::split::SplitArgs;
 use super::writing::extras::ExtraArgs;
 use super::writing::names::FileNames;
 use crate::cli::endpoint_args::EndpointArgs;
-use crate::cli::file_args::FileArgs;
+use crate::cli::file_args::{FileArgs, default_path};
 use crate::cli::output::AsJson;
 use crate::cli::parse::{self, whole_number};
 
@@ -42,6 +42,7 @@ const FLUSH_INTERVALS: RangeInclusive<Duration> =
     recorder record -o run.mcap --progress --json\n  \
     recorder record -o run.mcap --follow --wait\n  \
     recorder record -o run.mcap --split-size 1GB --max-files 10 --min-free 5GB\n  \
+    recorder record -o run.mcap --min-free 5GB\n  \
     recorder record -o incident.mcap --black-box 30s --max-files 10\n  \
     recorder record -o run.mcap --every 10 --exclude status --meta operator=Ada\n  \
     recorder record -o flight.mcap --only-commands && recorder simulate flight.mcap -o run.mcap"
@@ -51,7 +52,7 @@ pub(crate) struct RecordArgs {
     #[command(flatten)]
     pub(super) endpoint: EndpointArgs,
     /// File to write. Its name ends in `.part` until it is finished
-    /// [default: NAME_<UTC time>.mcap]
+    /// [default: NAME_<UTC time>.mcap; NAME.mcap for a ring of files]
     #[arg(short, long, value_name = "OUT.mcap")]
     pub(super) output: Option<PathBuf>,
     /// Go on in the next file when another scene is loaded, when another run starts, and after a
@@ -172,11 +173,26 @@ fn queue_bytes(text: &str) -> Result<u64, String> {
 }
 
 impl RecordArgs {
-    /// Returns the names of the files.
-    pub(super) fn names(&self, default: PathBuf) -> FileNames {
-        let path = self.output.clone().unwrap_or(default);
-        let is_numbered = self.follows() || self.split.is_given();
-        if is_numbered { FileNames::numbered(path) } else { FileNames::Single(path) }
+    /// Returns the names of the files. A ring has the same ones after each restart.
+    pub(super) fn names(&self, name: &str, now_ns: u64) -> FileNames {
+        let default = || {
+            if self.is_ring() {
+                PathBuf::from(format!("{name}.mcap"))
+            } else {
+                default_path(name, now_ns)
+            }
+        };
+        let path = self.output.clone().unwrap_or_else(default);
+        if self.is_numbered() { FileNames::numbered(path) } else { FileNames::Single(path) }
+    }
+
+    fn is_numbered(&self) -> bool {
+        self.follows() || self.split.is_given()
+    }
+
+    /// Returns `true` if the recording removes its oldest files.
+    pub(super) fn is_ring(&self) -> bool {
+        self.is_numbered() && self.split.ring().is_given()
     }
 
     /// Returns `true` if the recording goes on with another load or run. A black box always does.
@@ -191,20 +207,46 @@ impl RecordArgs {
             let text = format!("--only-commands needs {name}: remove it from --exclude\n");
             return Err(clap::Error::raw(ErrorKind::ArgumentConflict, text));
         }
-        let ring = self.split.ring().option();
-        let Some(option) = ring.filter(|_| !self.follows() && !self.split.is_given()) else {
+        if self.split.ring().files_max.is_none() || self.is_numbered() {
             return Ok(());
-        };
-        let text = format!(
-            "{option} needs a limit of a file, or --follow: add --split-size or --split-duration\n"
-        );
+        }
+        let text = "--max-files needs a limit of a file, or --follow: add --split-size or --split-duration\n";
         Err(clap::Error::raw(ErrorKind::MissingRequiredArgument, text))
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use clap::Parser;
+
     use super::*;
+
+    #[derive(Debug, Parser)]
+    struct Options {
+        #[command(flatten)]
+        record: RecordArgs,
+    }
+
+    fn parse(args: &[&str]) -> RecordArgs {
+        Options::parse_from([&["record"], args].concat()).record
+    }
+
+    #[test]
+    fn a_ring_has_the_same_name_after_each_restart() {
+        let name = |args: &[&str]| parse(args).names("sim", 1_764_072_000_000_000_000).path(0);
+        let ring = ["--follow", "--min-free", "1GB"];
+        assert_eq!(name(&ring), PathBuf::from("sim_0000.mcap"));
+        assert_eq!(name(&["--follow"]), PathBuf::from("sim_2025-11-25T12-00-00Z_0000.mcap"));
+        assert_eq!(name(&["--min-free", "1GB"]), PathBuf::from("sim_2025-11-25T12-00-00Z.mcap"));
+        assert_eq!(name(&["-o", "run.mcap", "--follow"]), PathBuf::from("run_0000.mcap"));
+    }
+
+    #[test]
+    fn a_number_of_files_needs_a_limit_of_a_file_and_a_reserve_does_not() {
+        assert!(parse(&["--max-files", "3"]).check().is_err());
+        assert!(parse(&["--max-files", "3", "--follow"]).check().is_ok());
+        assert!(parse(&["--min-free", "3GB"]).check().is_ok());
+    }
 
     #[test]
     fn the_queue_is_a_size_within_limits() {

@@ -6,7 +6,7 @@ pub(crate) mod trigger;
 
 use std::sync::Arc;
 
-use recorder::{Closing, ContentSelection, RunDescription};
+use recorder::{AllCounts, Closing, ContentSelection, RunDescription};
 use sim_contract::clock::{SECOND_NS, monotonic_ns, realtime_ns};
 use sim_contract::{LostChanges, ReadError, State, StatusFlags};
 
@@ -107,7 +107,20 @@ impl Feed {
             self.end_part(reason.text().to_owned(), end);
         }
         self.accepted.spare = self.queue.take_spare();
+        self.delay_file();
         self.intake.accept_state(state, Now::read(), &mut self.accepted)
+    }
+
+    /// Delays the next file while the disk stalls, so that the starts of files do not fill the memory.
+    fn delay_file(&mut self) {
+        let is_delayed = !self.intake.has_started() && !self.queue.has_room();
+        if is_delayed && !self.intake.is_delayed() {
+            output::note(
+                "warning: the disk does not keep up, and --queue-bytes of messages wait for it; the next file begins \
+                 when it has caught up, and declares the snapshots before it as missing",
+            );
+        }
+        self.intake.delay(is_delayed);
     }
 
     /// Returns the reason why another file begins with a state.
@@ -130,7 +143,7 @@ impl Feed {
             }
             None => self.split.is_due(file, &self.position, self.queue.size_bytes(), now_ns),
         };
-        is_due && FirstState::is_complete(state)
+        is_due && self.queue.has_room() && FirstState::is_complete(state)
     }
 
     /// Accepts messages that arrived between states, and passes everything to the queue. Returns the end
@@ -289,6 +302,11 @@ impl Feed {
     /// Returns the number of snapshots that came before the first keyframe of a file.
     pub(crate) fn skipped_count(&self) -> u64 {
         self.intake.skipped_count()
+    }
+
+    /// Returns the numbers of missing messages since the last file, which no file declares.
+    pub(crate) fn undeclared(&self) -> AllCounts {
+        self.intake.undeclared()
     }
 
     /// Counts messages that could not be read.

@@ -2,7 +2,7 @@
 
 mod started;
 
-use recorder::{AllCounts, Closing};
+use recorder::{AllCounts, Closing, Topic};
 use sim_contract::{
     Change, LostChanges, NodeStatus, Outcome, ReadError, SnapshotFlags, SnapshotHeader, State,
 };
@@ -11,7 +11,7 @@ use super::accepted::{Accepted, RunEnd};
 use super::first_state::FirstState;
 use super::load::{Load, LoadError, Now};
 use super::messages::Messages;
-use started::{PreviousFile, Started};
+use started::{Passed, PreviousFile, Started};
 
 /// Most outcomes to keep before the first state. Beyond it the oldest are dropped.
 const OUTCOMES_PENDING_MAX: usize = 1 << 16;
@@ -41,6 +41,10 @@ pub(crate) struct Intake {
     /// The number of these snapshots before all files.
     skipped_count: u64,
     lost: LostChanges,
+    /// The disk stalls, so no file begins.
+    is_delayed: bool,
+    /// States and outcomes since the last file, between which no file could begin.
+    passed: Passed,
     /// Messages after the first state or the candidate that arrived but could not be read.
     unreadable: u64,
     /// The candidate or first state is new, and the errors of the messages before it have not been added.
@@ -90,6 +94,13 @@ impl Intake {
             outcome.run_id != state.header.run_id || outcome.index >= first_outcome
         });
         self.skip_candidate();
+        if self.is_delayed {
+            self.candidate = None;
+            if let Some(previous) = &mut self.previous {
+                previous.pass(state.header, &mut self.passed);
+            }
+            return Ok(());
+        }
         if state.header.snapshot_index == 0 && is_replay(state.header) {
             self.seen_replay = Some(state.header.run_id);
         }
@@ -194,7 +205,10 @@ impl Intake {
         let Some(load) = &mut self.load else { return };
         let previous = self.previous.as_ref();
         let mut started = Started::new(&first, previous, self.lost);
-        started.add_gaps(self.skipped.count);
+        started.add_gaps(self.skipped.count, 0);
+        let Passed { states, outcomes } = std::mem::take(&mut self.passed);
+        let ended = previous.filter(|previous| previous.run_id != first.header.run_id);
+        started.add_gaps(states, outcomes + ended.map_or(0, PreviousFile::passed_outcomes));
         self.skipped_count += self.skipped.count;
         if previous.is_none() {
             started.set_steps_max(self.steps_max);
@@ -237,6 +251,26 @@ impl Intake {
     /// Returns the number of snapshots that came before the first keyframe of a file.
     pub(crate) fn skipped_count(&self) -> u64 {
         self.skipped_count
+    }
+
+    /// Begins no file until this is called with `false`. The states until then are missing.
+    pub(crate) fn delay(&mut self, is_delayed: bool) {
+        self.is_delayed = is_delayed;
+    }
+
+    /// Returns `true` if no file begins.
+    pub(crate) fn is_delayed(&self) -> bool {
+        self.is_delayed
+    }
+
+    /// Returns the numbers of missing messages since the last file, which no file declares.
+    pub(crate) fn undeclared(&self) -> AllCounts {
+        let mut counts = AllCounts::default();
+        counts[Topic::Steps].gaps = self.passed.states;
+        counts[Topic::Particles].gaps = self.passed.states;
+        let passed = self.previous.as_ref().map_or(0, PreviousFile::passed_outcomes);
+        counts[Topic::Outcomes].gaps = self.passed.outcomes + passed;
+        counts
     }
 
     /// Returns the first step of the file, once it has begun.

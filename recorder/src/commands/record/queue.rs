@@ -84,7 +84,8 @@ pub(crate) enum Entry {
 ///
 /// The limit applies to snapshots. Other messages are small, and later steps build on them, so their
 /// limit is twice as high. The first snapshot of a file and everything before it, without which the file
-/// is useless, and an item that finds the queue empty are always accepted. Beyond that, a reader must be
+/// is useless, and an item that finds the queue empty are always accepted, so no file may begin without
+/// [`Queue::has_room`]. Beyond that, a reader must be
 /// able to collect the messages between two snapshots: the queue drops those for which the [`Backlog`] has
 /// no room.
 #[derive(Debug)]
@@ -165,6 +166,11 @@ impl Queue {
     /// Returns the numbers of dropped messages of the newest file.
     pub(crate) fn lost(&self) -> AllCounts {
         self.lock().lost
+    }
+
+    /// Returns `true` if another file may begin.
+    pub(crate) fn has_room(&self) -> bool {
+        self.lock().size_bytes < self.limit_bytes
     }
 
     /// Returns the size of what waits, in bytes.
@@ -261,7 +267,10 @@ impl State {
 impl Entry {
     fn size_bytes(&self) -> usize {
         match self {
-            Self::Begin { header, .. } => size_of::<RunHeader>() + header.scene.len(),
+            Self::Begin { header, .. } => {
+                let meshes: usize = header.colliders.files.iter().map(|file| file.text.len()).sum();
+                size_of::<RunHeader>() + header.scene.len() + meshes
+            }
             Self::Item(item) => item.content.size_bytes(),
             Self::End(..) => size_of::<Closing>(),
         }

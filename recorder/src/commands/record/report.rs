@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-use recorder::{Closing, Topic};
+use recorder::{AllCounts, Closing, Topic};
 use serde::Serialize;
 
 use crate::cli::counted::counted;
@@ -16,7 +16,7 @@ pub(crate) struct Written {
     /// The newest file.
     last_path: PathBuf,
     file_count: u64,
-    /// Number of the oldest files that were removed again.
+    /// Number of the files of the ring that were removed, those of earlier recordings included.
     pub(crate) removed_count: u64,
     /// The sums of the counts of all files.
     total: Closing,
@@ -36,6 +36,11 @@ impl Written {
         }
     }
 
+    /// Adds missing messages that no file declares.
+    pub(crate) fn add_undeclared(&mut self, counts: &AllCounts) {
+        self.total.counts.add(counts);
+    }
+
     /// Describes a finished file in a line.
     pub(crate) fn file_line(path: &Path, closing: &Closing, steps: Option<(u64, u64)>) -> String {
         let count = closing.counts[Topic::Steps].written;
@@ -53,9 +58,9 @@ impl Written {
 pub(crate) struct Report {
     /// The newest file, if there is one.
     output: Option<String>,
-    /// Number of files, with the removed ones.
+    /// Number of written files, with those that were removed again.
     files: u64,
-    /// Number of the oldest files that were removed again.
+    /// Number of the files of the ring that were removed, those of earlier recordings included.
     removed_files: u64,
     first_step: Option<u64>,
     last_step: Option<u64>,
@@ -108,9 +113,9 @@ impl fmt::Display for Report {
                 writeln!(f, "written     nothing: no mark, tear, frozen particle or SIGUSR1 came")?;
             }
         }
-        if self.files > 1 {
+        if self.files > 1 || self.removed_files > 0 {
             let (files, removed) = (self.files, self.removed_files);
-            writeln!(f, "files       {files}, {removed} of them removed")?;
+            writeln!(f, "files       {files} written, {removed} removed")?;
         }
         let snapshots = self.snapshots;
         match (self.first_step, self.last_step) {

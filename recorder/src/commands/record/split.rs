@@ -1,7 +1,11 @@
 //! The limits at which a file ends and the next one begins.
 
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
+
+use rustix::fs::statvfs;
 
 use crate::cli::parse::{self, size_bytes};
 
@@ -22,11 +26,12 @@ pub(crate) struct SplitArgs {
     /// Go on in the next file at the first keyframe after this time, such as 10min, at least 1s
     #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = split_duration)]
     split_duration: Option<Duration>,
-    /// Keep the newest N files, at least 2, and remove older ones of this recording
+    /// Keep the newest N files, at least 2, and remove older ones. A recorder with the same name goes on with the
+    /// next number, and the files before it count
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = file_count)]
     max_files: Option<u64>,
-    /// While less than this is free on the disk, such as 10GB, remove the oldest file of this recording at
-    /// each flush
+    /// While less than this is free on the disk, such as 10GB, remove the oldest file at each flush. A recording
+    /// in a single file ends instead
     #[arg(long, value_name = "SIZE", allow_hyphen_values = true, value_parser = size_bytes)]
     min_free: Option<u64>,
 }
@@ -41,10 +46,15 @@ pub(crate) struct Ring {
 }
 
 impl Ring {
-    /// Returns the option of a limit, if there is one.
-    pub(crate) fn option(self) -> Option<&'static str> {
-        let max_files = self.files_max.map(|_| "--max-files");
-        max_files.or(self.free_min_bytes.map(|_| "--min-free"))
+    /// Returns `true` if there is a limit.
+    pub(crate) fn is_given(self) -> bool {
+        self.files_max.is_some() || self.free_min_bytes.is_some()
+    }
+
+    /// Returns `true` if less than the reserve is free on the disk of a file. Unknown space is enough.
+    pub(crate) fn is_short(self, path: &Path) -> bool {
+        let free_bytes = self.free_min_bytes.and_then(|_| free_bytes(path));
+        free_bytes.zip(self.free_min_bytes).is_some_and(|(free, free_min)| free < free_min)
     }
 }
 
@@ -58,6 +68,13 @@ impl SplitArgs {
     pub(crate) fn ring(&self) -> Ring {
         Ring { files_max: self.max_files, free_min_bytes: self.min_free }
     }
+}
+
+/// Returns the free space of the disk of a file, in bytes; `None` if it is unknown.
+fn free_bytes(path: &Path) -> Option<u64> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let disk = statvfs(folder.unwrap_or(Path::new("."))).ok()?;
+    Some(disk.f_bavail * disk.f_frsize)
 }
 
 fn split_size(text: &str) -> Result<u64, String> {
@@ -80,7 +97,11 @@ fn file_count(text: &str) -> Result<u64, String> {
 
 /// The file that the writing thread writes, for the reading thread.
 #[derive(Debug, Default)]
-pub(crate) struct WritePosition(Mutex<Option<FilePosition>>);
+pub(crate) struct WritePosition {
+    file: Mutex<Option<FilePosition>>,
+    /// The disk has less free space than its reserve.
+    is_short: AtomicBool,
+}
 
 #[derive(Debug, Clone, Copy)]
 struct FilePosition {
@@ -90,19 +111,29 @@ struct FilePosition {
 
 impl WritePosition {
     pub(crate) fn set(&self, number: u64, size_bytes: u64) {
-        *self.0.lock().unwrap_or_else(PoisonError::into_inner) =
+        *self.file.lock().unwrap_or_else(PoisonError::into_inner) =
             Some(FilePosition { number, size_bytes });
+    }
+
+    /// Ends the recording, because the disk has less free space than its reserve.
+    pub(crate) fn end_for_reserve(&self) {
+        self.is_short.store(true, Ordering::Relaxed);
+    }
+
+    /// Returns `true` if the recording ends for the reserve of its disk.
+    pub(crate) fn ends_for_reserve(&self) -> bool {
+        self.is_short.load(Ordering::Relaxed)
     }
 
     /// Returns the number and the size of the file.
     pub(crate) fn get(&self) -> Option<(u64, u64)> {
-        let position = *self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let position = *self.file.lock().unwrap_or_else(PoisonError::into_inner);
         position.map(|position| (position.number, position.size_bytes))
     }
 
     /// Returns the size of a file; `None` if the writing thread has not begun it.
     fn size_bytes_of(&self, number: u64) -> Option<u64> {
-        let position = *self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let position = *self.file.lock().unwrap_or_else(PoisonError::into_inner);
         position.filter(|position| position.number == number).map(|position| position.size_bytes)
     }
 }

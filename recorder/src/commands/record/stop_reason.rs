@@ -12,6 +12,8 @@ pub(crate) enum StopReason {
     /// The file has reached a limit, and the next one begins.
     Split,
     WriteError,
+    /// The disk has less free space than its reserve.
+    Reserve,
     /// The reader of the progress has gone.
     ReaderGone,
 }
@@ -27,6 +29,7 @@ impl StopReason {
             Self::Run(RunEnd::EndStep) => "steps reached",
             Self::Split => "split",
             Self::WriteError => "write error",
+            Self::Reserve => "less than --min-free is free",
             Self::ReaderGone => "reader of the progress gone",
         }
     }
@@ -51,6 +54,7 @@ impl StopReason {
             | Self::Run(RunEnd::EndStep)
             | Self::Split
             | Self::WriteError
+            | Self::Reserve
             | Self::ReaderGone => None,
         }
     }

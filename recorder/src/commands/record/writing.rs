@@ -4,6 +4,7 @@ pub(crate) mod black_box;
 pub(crate) mod extras;
 pub(crate) mod names;
 
+use std::collections::VecDeque;
 use std::fs;
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
@@ -15,7 +16,6 @@ use anyhow::{Context, anyhow};
 use recorder::{
     Closing, ContentSelection, LogOptions, LogWriter, Message, PartFile, ParticleBuffer, WriteError,
 };
-use rustix::fs::statvfs;
 use sim_contract::clock::monotonic_ns;
 
 use super::load::RunHeader;
@@ -39,6 +39,8 @@ pub(crate) struct WriteOptions {
     pub(crate) extras: Extras,
     pub(crate) selection: ContentSelection,
     pub(crate) ring: Ring,
+    /// Files of the ring from before this recording, oldest first.
+    pub(crate) earlier: Vec<PathBuf>,
     /// Every flush waits until the data is on the disk.
     pub(crate) is_synced: bool,
     /// The most that a killed recorder or a power cut loses, besides the open chunk.
@@ -73,15 +75,7 @@ pub(crate) fn start(
 ) -> anyhow::Result<JoinHandle<anyhow::Result<Written>>> {
     let queue = CloseOnDrop(queue);
     let writing = thread::Builder::new().name("writer".to_owned()).spawn(move || {
-        let mut files = Files {
-            options,
-            position,
-            created: first,
-            open: None,
-            next_number: 0,
-            oldest_number: 0,
-            written: Written::default(),
-        };
+        let mut files = Files::new(options, position, first);
         files.write_all(&queue.0)?;
         files.close()
     });
@@ -97,8 +91,8 @@ struct Files {
     created: Option<PartFile>,
     open: Option<OpenFile>,
     next_number: u64,
-    /// Number of the oldest file that was not removed.
-    oldest_number: u64,
+    /// The files of the ring, oldest first. The last one is in progress.
+    ring_files: VecDeque<PathBuf>,
     written: Written,
 }
 
@@ -113,6 +107,16 @@ struct OpenFile {
 }
 
 impl Files {
+    fn new(
+        mut options: WriteOptions,
+        position: Arc<WritePosition>,
+        created: Option<PartFile>,
+    ) -> Self {
+        let ring_files = std::mem::take(&mut options.earlier).into();
+        let written = Written::default();
+        Self { options, position, created, open: None, next_number: 0, ring_files, written }
+    }
+
     /// Writes every entry of the queue, and flushes at intervals.
     fn write_all(&mut self, queue: &Queue) -> anyhow::Result<()> {
         let interval_ns = self.options.flush_interval.as_nanos();
@@ -181,7 +185,7 @@ impl Files {
         self.finish(file.closing)
     }
 
-    /// Begins the next file. In a ring, removes the file in whose place it comes, once it is there.
+    /// Begins the next file. In a ring, removes the oldest files after creating this one.
     fn begin(&mut self, header: &RunHeader, log_time_ns: u64) -> anyhow::Result<()> {
         let number = self.next_number;
         self.next_number += 1;
@@ -195,40 +199,60 @@ impl Files {
         self.options.extras.write(&mut log).with_context(|| incomplete(&part_path))?;
         self.position.set(number, log.size_bytes());
         self.open = Some(OpenFile { number, part_path, log, steps: None });
-        let files_max = self.options.ring.files_max.unwrap_or(u64::MAX);
-        while self.next_number - self.oldest_number > files_max {
-            self.remove_oldest()?;
-        }
-        self.free_space()
-    }
-
-    /// Removes the oldest file if less than the reserve is free, but not the one in progress. Only one at a
-    /// time, because some file systems show its space as free only seconds later.
-    fn free_space(&mut self) -> anyhow::Result<()> {
-        let Some(free_min_bytes) = self.options.ring.free_min_bytes else { return Ok(()) };
-        let free_bytes = free_bytes(&self.options.names.path(self.oldest_number));
-        let is_short = free_bytes.is_some_and(|free_bytes| free_bytes < free_min_bytes);
-        if is_short && self.oldest_number + 1 < self.next_number {
-            let path = output::path_text(&self.options.names.path(self.oldest_number));
-            output::note(&format!("removing {path}, because less than --min-free is free"));
-            self.remove_oldest()?;
-        }
+        self.trim_ring(number);
         Ok(())
     }
 
-    /// Removes a finished file, unless another program has moved it.
-    fn remove_oldest(&mut self) -> anyhow::Result<()> {
-        let path = self.options.names.path(self.oldest_number);
-        self.oldest_number += 1;
-        match fs::remove_file(&path) {
-            Ok(()) => self.written.removed_count += 1,
-            Err(error) if error.kind() == ErrorKind::NotFound => {}
-            Err(error) => {
-                let text = format!("cannot remove {}", output::path_text(&path));
-                return Err(anyhow!(error).context(text));
+    /// Adds a file to the ring, if this is one, and removes those that are too many.
+    fn trim_ring(&mut self, number: u64) {
+        let ring = self.options.ring;
+        if ring.is_given() && !self.options.names.is_single() {
+            self.ring_files.push_back(self.options.names.path(number));
+        }
+        let count_max = ring.files_max.and_then(|count| usize::try_from(count).ok());
+        while self.ring_files.len() > count_max.unwrap_or(usize::MAX) {
+            self.remove_oldest();
+        }
+        self.keep_reserve();
+    }
+
+    /// If less than the reserve is free, removes the oldest file of a ring, but not the one in progress, and
+    /// ends the recording of a single file. Removes only one at a time, because some file systems show its
+    /// space as free only seconds later.
+    fn keep_reserve(&mut self) {
+        let names = &self.options.names;
+        if !self.options.ring.is_short(&names.path(0)) {
+            return;
+        }
+        if names.is_single() {
+            self.position.end_for_reserve();
+            return;
+        }
+        while self.ring_files.len() > 1 {
+            let path = output::path_text(&self.ring_files[0]);
+            output::note(&format!("removing {path}, because less than --min-free is free"));
+            if self.remove_oldest() {
+                return;
             }
         }
-        Ok(())
+    }
+
+    /// Removes the oldest file of the ring, unless another program has moved it. One that cannot be removed
+    /// stays, because the newest data matter most. Returns `true` if a file was removed.
+    fn remove_oldest(&mut self) -> bool {
+        let Some(path) = self.ring_files.pop_front() else { return false };
+        match fs::remove_file(&path) {
+            Ok(()) => {
+                self.written.removed_count += 1;
+                return true;
+            }
+            Err(error) if error.kind() == ErrorKind::NotFound => {}
+            Err(error) => output::note(&format!(
+                "warning: cannot remove {} ({error}); it stays, and takes space beside the files of the ring",
+                output::path_text(&path)
+            )),
+        }
+        false
     }
 
     fn write(&mut self, item: Item) -> anyhow::Result<()> {
@@ -242,7 +266,7 @@ impl Files {
     }
 
     fn flush(&mut self) -> anyhow::Result<()> {
-        self.free_space()?;
+        self.keep_reserve();
         let Some(open) = &mut self.open else { return Ok(()) };
         open.log.flush().with_context(|| incomplete(&open.part_path))?;
         self.position.set(open.number, open.log.size_bytes());
@@ -264,7 +288,7 @@ impl Files {
             let is_complete = error.leaves_complete_file();
             if is_complete { anyhow!(error) } else { anyhow!(error).context(kept()) }
         })?;
-        if matches!(self.options.names, FileNames::Numbered { .. }) {
+        if !self.options.names.is_single() {
             output::note(&Written::file_line(&path, &closing, steps));
         }
         self.written.add(path, &closing, steps);
@@ -278,13 +302,6 @@ impl Files {
         }
         Ok(self.written)
     }
-}
-
-/// Returns the free space of the disk of a file, in bytes; `None` if it is unknown.
-fn free_bytes(path: &Path) -> Option<u64> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-    let disk = statvfs(folder.unwrap_or(Path::new("."))).ok()?;
-    Some(disk.f_bavail * disk.f_frsize)
 }
 
 fn incomplete(part_path: &Path) -> String {

@@ -14,6 +14,8 @@ use sim_contract::{Endpoint, console};
 
 /// File name of the program.
 const PROGRAM: &str = "recorder";
+/// Free space of the disk below which a recording ends.
+const DISK_RESERVE: &str = "1GB";
 /// Start of the line in which a program gives the reason of its failure.
 const ERROR: &str = "error: ";
 
@@ -55,6 +57,8 @@ pub(super) enum StopReason {
     NewRun,
     #[serde(rename = "new scene loaded")]
     NewLoad,
+    #[serde(rename = "less than --min-free is free")]
+    Reserve,
     #[serde(other)]
     Other,
 }
@@ -133,7 +137,8 @@ impl RecorderProcess {
 )]
 fn command(program: &Path, endpoint: &Endpoint, path: &Path) -> Command {
     let mut command = Command::new(program);
-    command.args(["record", "--progress", "--json", "--name", endpoint.name()]);
+    command.args(["record", "--progress", "--json", "--min-free", DISK_RESERVE]);
+    command.args(["--name", endpoint.name()]);
     if let Some(domain) = endpoint.domain() {
         command.args(["--domain", domain]);
     }
@@ -183,6 +188,9 @@ mod tests {
         let report = r#"{"output":"run.mcap","files":1,"snapshots":7,"lost":{},"stop_reason":"new scene loaded"}"#;
         let Ok(Line::Report(report)) = serde_json::from_str(report) else { panic!() };
         assert_eq!((report.snapshots, report.stop_reason), (7, StopReason::NewLoad));
+        let reserve = r#"{"snapshots":7,"lost":{},"stop_reason":"less than --min-free is free"}"#;
+        let Ok(Line::Report(report)) = serde_json::from_str(reserve) else { panic!() };
+        assert_eq!(report.stop_reason, StopReason::Reserve);
         let other = r#"{"snapshots":7,"lost":{},"stop_reason":"something newer"}"#;
         let Ok(Line::Report(report)) = serde_json::from_str(other) else { panic!() };
         assert_eq!(report.stop_reason, StopReason::Other);

@@ -22,20 +22,47 @@ pub(super) struct PreviousFile {
     next_snapshot: u32,
     /// Index of the next outcome.
     pub(super) next_outcome: u64,
+    /// Number of the outcomes up to the newest state.
+    outcome_count: u64,
     /// Number of the next change of the members; `None` before the first status.
     next_member_change: Option<u64>,
     /// First step of the first file of this run.
     first_step_of_run: u64,
     /// The last step to record.
     end_step: u64,
-    /// Wall clock of step 0, in nanoseconds since 1970.
-    epoch_ns: u64,
+    /// Wall clock of step 0, in nanoseconds since 1970. `None` if the file belongs to an earlier run.
+    epoch_ns: Option<u64>,
+}
+
+/// Missing messages between two files.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Passed {
+    pub(super) states: u64,
+    /// Those of runs that have ended.
+    pub(super) outcomes: u64,
 }
 
 impl PreviousFile {
     /// Returns the wall clock of step 0, if this file belongs to the run of a snapshot.
     pub(super) fn epoch_ns_of(&self, first: &SnapshotHeader) -> Option<u64> {
-        (self.run_id == first.run_id).then_some(self.epoch_ns)
+        self.epoch_ns.filter(|_| self.run_id == first.run_id)
+    }
+
+    /// Counts a state between this file and the next one as missing.
+    pub(super) fn pass(&mut self, header: &SnapshotHeader, passed: &mut Passed) {
+        passed.states += self.missing_before(header) + 1;
+        if self.run_id != header.run_id {
+            passed.outcomes += self.passed_outcomes();
+            (self.run_id, self.next_outcome, self.epoch_ns) = (header.run_id, 0, None);
+            (self.next_member_change, self.first_step_of_run) = (None, header.step);
+        }
+        self.next_snapshot = header.snapshot_index.wrapping_add(1);
+        self.outcome_count = header.outcome_count;
+    }
+
+    /// Returns the number of outcomes of its run that are missing so far.
+    pub(super) fn passed_outcomes(&self) -> u64 {
+        self.outcome_count.saturating_sub(self.next_outcome)
     }
 
     /// Returns the number of snapshots between this file and one that begins with `first`. A node
@@ -130,9 +157,10 @@ impl Started {
         &self.last
     }
 
-    /// Adds snapshots that are missing before the first one.
-    pub(super) fn add_gaps(&mut self, count: u64) {
-        self.state_gaps += count;
+    /// Adds snapshots and outcomes that are missing before the first ones.
+    pub(super) fn add_gaps(&mut self, states: u64, outcomes: u64) {
+        self.state_gaps += states;
+        self.counts[Topic::Outcomes].gaps += outcomes;
     }
 
     /// Ends the recording a number of steps after the first one.
@@ -143,14 +171,16 @@ impl Started {
 
     /// Ends the file.
     pub(super) fn into_previous(self, epoch_ns: u64) -> PreviousFile {
+        let next_outcome = self.next_outcome.max(self.last.outcome_count);
         PreviousFile {
             run_id: self.run_id,
             next_snapshot: self.next_snapshot,
-            next_outcome: self.next_outcome.max(self.last.outcome_count),
+            next_outcome,
+            outcome_count: next_outcome,
             next_member_change: self.next_member_change,
             first_step_of_run: self.first_step_of_run,
             end_step: self.end_step,
-            epoch_ns,
+            epoch_ns: Some(epoch_ns),
         }
     }
 

@@ -4,7 +4,12 @@ use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use anyhow::bail;
 use recorder::{Existing, PartFileError};
+use sim_contract::is_being_written;
+
+use crate::cli::counted::counted;
+use crate::cli::output;
 
 /// The names of the files of a recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -27,13 +32,35 @@ impl FileNames {
         Self::Numbered { path, first: 0 }
     }
 
-    /// Numbers the files after those that are in the folder.
-    pub(crate) fn after_earlier_files(mut self) -> Self {
-        let next = self.earlier_files().iter().filter_map(|path| self.number_of(path)).max();
+    /// Returns `true` for the name of a single file.
+    pub(crate) fn is_single(&self) -> bool {
+        matches!(self, Self::Single(_))
+    }
+
+    /// Numbers the files after those that are in the folder. Returns those, oldest first.
+    pub(crate) fn after_earlier_files(mut self) -> (Self, Vec<PathBuf>) {
+        let earlier = self.earlier_files();
+        let last = earlier.last().and_then(|path| self.number_of(path));
         if let Self::Numbered { first, .. } = &mut self {
-            *first = next.map_or(0, |last| last + 1);
+            *first = last.map_or(0, |last| last.saturating_add(1));
         }
-        self
+        (self, earlier)
+    }
+
+    /// Numbers the files of a ring after those of earlier recordings, and returns these.
+    pub(crate) fn after_ring(self) -> anyhow::Result<(Self, Vec<PathBuf>)> {
+        let (names, earlier) = self.after_earlier_files();
+        if let Some(path) = earlier.iter().find(|path| is_being_written(path)) {
+            let path = path.display();
+            bail!(
+                "{path} is being written by another recorder; end it, or choose another name with -o"
+            );
+        }
+        if let Some(last) = earlier.last() {
+            let (files, last) = (counted(earlier.len() as u64, "earlier file"), last.display());
+            output::note(&format!("the ring goes on after {last}, with {files}"));
+        }
+        Ok((names, earlier))
     }
 
     /// Returns the path of a file, counted from 0.
@@ -63,21 +90,17 @@ impl FileNames {
         }
     }
 
-    /// Returns the numbered files, finished or not, that are in the folder. A folder that cannot be
+    /// Returns the numbered files, finished or not, that are in the folder, by their numbers. A folder that cannot be
     /// read is reported when a file is created.
     fn earlier_files(&self) -> Vec<PathBuf> {
         let Self::Numbered { path, .. } = self else { return Vec::new() };
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
         let entries = fs::read_dir(folder.unwrap_or(Path::new("."))).into_iter().flatten();
-        let names = entries.flatten().map(|entry| entry.file_name());
-        let mut names: Vec<_> = names.filter(|name| self.has_name(name)).collect();
-        names.sort();
-        names.into_iter().map(|name| path.with_file_name(name)).collect()
-    }
-
-    /// Returns `true` for the name of a file, finished or not, with any number.
-    fn has_name(&self, name: &OsString) -> bool {
-        self.number_of(Path::new(name)).is_some()
+        let names = entries.flatten().map(|entry| path.with_file_name(entry.file_name()));
+        let numbered = names.filter_map(|path| Some((self.number_of(&path)?, path)));
+        let mut files: Vec<_> = numbered.collect();
+        files.sort_unstable();
+        files.into_iter().map(|(_, path)| path).collect()
     }
 
     /// Returns the number in the name of a file of this recording, finished or not.
@@ -116,11 +139,13 @@ mod tests {
     #[test]
     fn only_numbered_files_of_the_same_name_belong_to_a_recording() {
         let names = FileNames::numbered(PathBuf::from("logs/run.mcap"));
-        for name in ["run_0000.mcap", "run_12345.mcap", "run_0003.mcap.part"] {
-            assert!(names.has_name(&OsString::from(name)), "{name}");
+        for (name, number) in
+            [("run_0000.mcap", 0), ("run_12345.mcap", 12345), ("run_0003.mcap.part", 3)]
+        {
+            assert_eq!(names.number_of(Path::new(name)), Some(number), "{name}");
         }
         for name in ["run.mcap", "run_1.mcap", "run_00a0.mcap", "run_0000.txt", "rerun_0000.mcap"] {
-            assert!(!names.has_name(&OsString::from(name)), "{name}");
+            assert_eq!(names.number_of(Path::new(name)), None, "{name}");
         }
     }
 }

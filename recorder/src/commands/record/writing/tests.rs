@@ -50,30 +50,32 @@ pub(super) fn header() -> RunHeader {
 
 /// A recording that keeps two files and has written two, `run_0000.mcap` and `run_0001.mcap`.
 fn full_ring(folder: &Folder) -> Files {
+    let mut files = ring(FileNames::numbered(folder.0.join("run.mcap")), Vec::new());
+    write_files(&mut files, 2);
+    files
+}
+
+fn write_files(files: &mut Files, count: usize) {
+    for _ in 0..count {
+        files.begin(&header(), 0).unwrap();
+        files.finish(closing()).unwrap();
+    }
+}
+
+/// A recording that keeps two files.
+fn ring(names: FileNames, earlier: Vec<PathBuf>) -> Files {
     let options = WriteOptions {
         file: Options::parse_from(["record"]).file,
-        names: FileNames::numbered(folder.0.join("run.mcap")),
+        names,
         extras: Extras::default(),
         selection: ContentSelection::default(),
         ring: Ring { files_max: Some(2), free_min_bytes: None },
+        earlier,
         is_synced: false,
         flush_interval: Duration::from_secs(1),
         black_box: None,
     };
-    let mut files = Files {
-        options,
-        position: Arc::new(WritePosition::default()),
-        created: None,
-        open: None,
-        next_number: 0,
-        oldest_number: 0,
-        written: Written::default(),
-    };
-    for _ in 0..2 {
-        files.begin(&header(), 0).unwrap();
-        files.finish(closing()).unwrap();
-    }
-    files
+    Files::new(options, Arc::default(), None)
 }
 
 fn closing() -> Closing {
@@ -101,6 +103,68 @@ fn a_ring_goes_on_when_another_program_has_moved_its_oldest_file() {
     files.finish(closing()).unwrap();
     assert_eq!(files.written.removed_count, 1);
     assert_eq!(names_in(&folder), ["run_0002.mcap", "run_0003.mcap"]);
+}
+
+#[test]
+fn a_ring_goes_on_over_restarts_and_removes_the_files_of_earlier_recordings_first() {
+    let folder = Folder::new("restarted");
+    drop(full_ring(&folder));
+    fs::rename(folder.0.join("run_0001.mcap"), folder.0.join("run_9999.mcap")).unwrap();
+    fs::write(folder.0.join("run_10000.mcap.part"), "of a killed recorder").unwrap();
+    fs::write(folder.0.join("other_0000.mcap"), "of another recording").unwrap();
+    let names = FileNames::numbered(folder.0.join("run.mcap"));
+    let (names, earlier) = names.after_ring().unwrap();
+    let mut files = ring(names, earlier);
+    write_files(&mut files, 1);
+    assert_eq!(names_in(&folder), ["other_0000.mcap", "run_10000.mcap.part", "run_10001.mcap"]);
+    assert_eq!(files.written.removed_count, 2);
+    write_files(&mut files, 1);
+    assert_eq!(names_in(&folder), ["other_0000.mcap", "run_10001.mcap", "run_10002.mcap"]);
+}
+
+#[test]
+fn a_ring_that_another_recorder_writes_is_refused() {
+    let folder = Folder::new("twice");
+    let mut files = full_ring(&folder);
+    files.begin(&header(), 0).unwrap();
+    let again = FileNames::numbered(folder.0.join("run.mcap")).after_ring();
+    let error = again.unwrap_err().to_string();
+    assert!(error.contains("run_0002.mcap.part is being written by another recorder"), "{error}");
+}
+
+/// A folder cannot be removed as a file, even by root.
+#[test]
+fn a_ring_goes_on_beside_files_that_cannot_be_removed() {
+    let folder = Folder::new("stuck");
+    let mut files = full_ring(&folder);
+    let replace_by_folder = |name: &str| {
+        fs::remove_file(folder.0.join(name)).unwrap();
+        fs::create_dir(folder.0.join(name)).unwrap();
+    };
+    replace_by_folder("run_0000.mcap");
+    write_files(&mut files, 2);
+    assert_eq!(names_in(&folder), ["run_0000.mcap", "run_0002.mcap", "run_0003.mcap"]);
+    assert_eq!(files.written.removed_count, 1);
+    // The next one is removed instead, at the same flush.
+    files.options.ring = Ring { files_max: None, free_min_bytes: Some(u64::MAX) };
+    replace_by_folder("run_0002.mcap");
+    files.begin(&header(), 0).unwrap();
+    assert_eq!(names_in(&folder), ["run_0000.mcap", "run_0002.mcap", "run_0004.mcap.part"]);
+}
+
+#[test]
+fn a_single_file_ends_for_the_reserve_of_its_disk() {
+    let folder = Folder::new("single");
+    let mut files = ring(FileNames::Single(folder.0.join("run.mcap")), Vec::new());
+    files.options.ring = Ring { files_max: None, free_min_bytes: Some(0) };
+    files.begin(&header(), 0).unwrap();
+    files.flush().unwrap();
+    assert!(!files.position.ends_for_reserve());
+    files.options.ring.free_min_bytes = Some(u64::MAX);
+    files.flush().unwrap();
+    assert!(files.position.ends_for_reserve());
+    files.finish(closing()).unwrap();
+    assert_eq!(names_in(&folder), ["run.mcap"]);
 }
 
 #[test]

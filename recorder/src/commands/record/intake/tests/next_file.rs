@@ -6,7 +6,7 @@ use sim_contract::SnapshotFlags;
 
 use super::*;
 use crate::commands::record::feed::Feed;
-use crate::commands::record::queue::Queue;
+use crate::commands::record::queue::{Entry, Queue};
 use crate::commands::record::split::{SplitArgs, WritePosition};
 
 /// Ends the file before a state of [`Node::new`]. `messages` have arrived before it. Returns the last
@@ -115,4 +115,88 @@ fn the_last_requested_step_holds_across_files() {
     assert_eq!(accepted.end, None);
     publish(&mut intake, header(6, 0), &[]);
     assert_eq!(publish(&mut intake, header(7, 0), &[]).end, Some(RunEnd::EndStep));
+}
+
+/// Memory for what waits in the tests below: less than the start of three files.
+const LIMIT_BYTES: usize = 1 << 16;
+
+/// Publishes a state of a node, with its load.
+fn feed_load(feed: &mut Feed, node: &mut Node, header: SnapshotHeader) {
+    let SnapshotHeader { run_id, step, .. } = header;
+    node.load.header.run_id = run_id;
+    node.torn.header.run_id = run_id;
+    node.colliders.header.run_id = run_id;
+    node.parameters.header.run_id = run_id;
+    let own = KeyframeHeader { run_id, ..keyframe_header(step) };
+    let state = State {
+        header: &header,
+        particles: &node.particles,
+        load: &node.load,
+        torn: &node.torn,
+        colliders: &node.colliders,
+        parameters: &node.parameters,
+        changes: &[Change::Load, Change::Keyframe(own, vec![1])],
+    };
+    feed.accept_state(&state, &mut Messages::default()).unwrap();
+    feed.accept_messages(Messages::default());
+}
+
+/// Writes everything that waits. Returns the numbers of recorded and of missing snapshots that the ends of
+/// files declare, and those of missing outcomes.
+fn drain(queue: &Queue) -> [u64; 3] {
+    let mut sums = [0; 3];
+    while let Some(entry) = queue.pop() {
+        let Entry::End(closing, _) = entry else { continue };
+        let (steps, outcomes) = (closing.counts[Topic::Steps], closing.counts[Topic::Outcomes]);
+        let found = [steps.received - steps.lost, steps.lost + steps.gaps, outcomes.gaps];
+        sums.iter_mut().zip(found).for_each(|(sum, one)| *sum += one);
+    }
+    sums
+}
+
+#[test]
+fn loads_and_runs_while_the_disk_stalls_take_bounded_memory_and_are_declared() {
+    const LOADS: u32 = 300;
+    let queue = Arc::new(Queue::new(LIMIT_BYTES));
+    let mut feed =
+        Feed::new(Intake::default(), Arc::clone(&queue), Arc::default(), SplitArgs::default())
+            .following(true);
+    let mut node = Node::new();
+    node.load.scene.extend([b'#'; LIMIT_BYTES / 2]);
+    for number in 0..LOADS {
+        // Three runs, of which the last two begin while the disk stalls; a run has 100 loads and 50 outcomes.
+        let (run, index) = (number / 100, number % 100);
+        let (run_id, topology_revision) = (RUN_ID + u64::from(run), index);
+        let first = header(index.into(), (index / 2).into());
+        feed_load(&mut feed, &mut node, SnapshotHeader { run_id, topology_revision, ..first });
+        assert!(queue.size_bytes() < 2 * LIMIT_BYTES, "load {number}");
+    }
+    let before = drain(&queue);
+    assert!(before[0] > 0 && before[0] < 4, "{before:?}");
+    // The disk has caught up, so the next load begins a file.
+    let next = SnapshotHeader { run_id: RUN_ID + 3, ..header(0, 0) };
+    feed_load(&mut feed, &mut node, next);
+    feed.end_file("signal".to_owned());
+    let after = drain(&queue);
+    assert_eq!(after[0], 1);
+    assert_eq!(before[0] + before[1] + after[0] + after[1], u64::from(LOADS) + 1);
+    assert_eq!(before[2] + after[2], 3 * 49);
+    assert_eq!(feed.undeclared(), AllCounts::default());
+}
+
+#[test]
+fn what_no_file_declares_is_in_the_report() {
+    let queue = Arc::new(Queue::new(LIMIT_BYTES));
+    let mut feed =
+        Feed::new(Intake::default(), Arc::clone(&queue), Arc::default(), SplitArgs::default())
+            .following(true);
+    let mut node = Node::new();
+    node.load.scene.extend([b'#'; LIMIT_BYTES]);
+    for step in 0..10 {
+        let topology_revision = u32::try_from(step).unwrap();
+        feed_load(&mut feed, &mut node, SnapshotHeader { topology_revision, ..header(step, step) });
+    }
+    let undeclared = feed.undeclared();
+    assert_eq!(undeclared[Topic::Steps].gaps, 9);
+    assert_eq!(undeclared[Topic::Outcomes].gaps, 9);
 }
