@@ -1,10 +1,8 @@
 //! The complete state of any step of a recording, simulated from the last keyframe before it.
 
-use std::path::Path;
-
 use sim_contract::{ParticleState, Stop, scene_hash};
 
-use crate::log::{Frame, FrameReader, LogReader, Message, ReadError, Tape, TapeError};
+use crate::log::{Frame, FrameReader, Message, ReadError, Tape, TapeError};
 use crate::recorded_scene::{RecordedSceneError, recorded_scene, scene_to_simulate};
 use crate::verification::{NotIdentical, Resimulation, ResimulationError};
 
@@ -64,13 +62,11 @@ pub enum CompleteStateError {
 /// Returns the complete state of a step, also of one whose snapshot is not in the file.
 ///
 /// It is simulated from the last complete state up to the step, for at most `steps_max` steps, and compared
-/// with every snapshot on the way. A step without a snapshot is proved by the next snapshot. `path` is the file
-/// of `tape`. After a signal, it ends with [`ReadError::Interrupted`] or [`NotIdentical::Interrupted`].
+/// with every snapshot on the way. A step without a snapshot is proved by the next snapshot. After a signal, it ends with [`ReadError::Interrupted`] or [`NotIdentical::Interrupted`].
 ///
 /// # Errors
 /// If the file cannot be read, or the recording does not lead to the step.
 pub fn complete_state(
-    path: &Path,
     tape: &mut Tape,
     step: u64,
     steps_max: u64,
@@ -82,7 +78,7 @@ pub fn complete_state(
     if count > steps_max {
         return Err(CompleteStateError::TooFar { step, count, max: steps_max });
     }
-    let mut frames = FrameReader::new(LogReader::open_until(path, stop)?);
+    let mut frames = FrameReader::new(tape.log().reader(stop)?);
     let log = frames.log();
     let scene = match count {
         0 => recorded_scene(log)?,

@@ -38,7 +38,7 @@ pub use read::frames::{Frame, FrameReader};
 pub use read::gaps::GapCounter;
 pub use read::open::open_regular_file;
 pub use read::read_error::{LogEnd, ReadError};
-pub use read::reader::LogReader;
+pub use read::reader::{LogReader, open_recording};
 pub use rows::{
     AnchorForceRow, BendColumns, ColliderBodyRow, ColliderDetails, ColliderForceRow, ColliderRow,
     CollidersRow, EventRow, ForcesRow, MeshFile, OutcomeRow, ParametersRow, SceneColliders,

@@ -9,7 +9,7 @@ use std::sync::atomic::AtomicBool;
 use recorder::simulation::{Job, States, simulate};
 use recorder::{
     Closing, CompleteState, CompleteStateError, LogOptions, LogReader, LogWriter, Message, Tape,
-    complete_state, parse_commands,
+    Topic, complete_state, parse_commands,
 };
 use sim_contract::{Stop, scene_hash};
 use sim_solver::{Keyframe, Scene, Solver, builtin};
@@ -88,7 +88,7 @@ impl Recording {
     }
 
     fn state(&mut self, step: u64) -> Result<CompleteState, CompleteStateError> {
-        complete_state(&self.path, &mut self.tape, step, u64::MAX, &Stop::default())
+        complete_state(&mut self.tape, step, u64::MAX, &Stop::default())
     }
 
     fn error(&mut self, step: u64) -> String {
@@ -131,7 +131,7 @@ fn the_state_of_every_step_is_that_of_a_solver_that_made_the_steps() {
 fn a_step_that_the_recording_does_not_reach_is_an_error() {
     let mut recording = Recording::write("reach", Some);
     assert_eq!(recording.error(400), "ends before step 400");
-    let error = complete_state(&recording.path, &mut recording.tape, 100, 29, &Stop::default());
+    let error = complete_state(&mut recording.tape, 100, 29, &Stop::default());
     let text = "step 100 takes 30 steps from the last complete state (allowed: up to 29)";
     assert_eq!(error.unwrap_err().to_string(), text);
     let mut late = Recording::write("late", |message| {
@@ -155,6 +155,18 @@ fn a_state_between_two_snapshots_is_proved_by_the_next_one() {
         let error = changed.error(step);
         assert!(error.starts_with("step 105 cannot be simulated: /particles: "), "{error}");
     }
+}
+
+/// Its readers share the open file, so none continues in the new one at a byte of the old one.
+#[test]
+fn an_open_recording_stays_the_same_when_another_file_gets_its_name() {
+    let mut recording = Recording::write("replaced", Some);
+    let is_kept = |message: &Message| message.step() > 0 || message.topic() != Topic::Keyframe;
+    let other = Recording::write("replacing", |message| Some(message).filter(is_kept));
+    let expected = recording.state(100).unwrap();
+    fs::rename(&other.path, &recording.path).unwrap();
+    fs::write(&other.path, "removed at the end of the test").unwrap();
+    assert_eq!(recording.state(100).unwrap(), expected);
 }
 
 #[test]

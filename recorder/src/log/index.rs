@@ -13,6 +13,7 @@ use std::fs::File;
 use std::io::ErrorKind;
 use std::os::unix::fs::FileExt;
 use std::path::Path;
+use std::sync::Arc;
 
 use mcap::records::{Record, op};
 
@@ -20,21 +21,20 @@ use sim_contract::Stop;
 
 use super::encoding::channel::TopicChannel;
 use super::read::decode::{LoggedMessage, MessageDecoder};
-use super::read::file_source::check_stop;
+use super::read::file_source::{FileSource, check_stop};
 use super::read::limits::SizeLimits;
-use super::read::open::open_regular_file;
 use super::read::read_error::{LogEnd, ReadError};
-use super::read::reader::{ChunkStart, LogReader};
+use super::read::reader::{ChunkStart, LogReader, open_recording};
 use super::read::records::RecordReader;
 use super::run::RunDescription;
 use super::run::selection::ContentSelection;
 use super::topic::Topic;
 use chunk::{LocatedChunk, record_size_bytes};
 
-/// A recording with random access to its chunks.
-#[derive(Debug)]
+/// A recording with random access to its chunks. Clones read the same file, also on other threads.
+#[derive(Debug, Clone)]
 pub struct IndexedLog {
-    file: File,
+    file: Arc<File>,
     format_version: u32,
     run: RunDescription,
     scene: Vec<u8>,
@@ -83,26 +83,25 @@ impl IndexedLog {
     /// # Errors
     /// If the file is not a recording or has no readable header.
     pub fn open(path: &Path) -> Result<Self, ReadError> {
-        Self::open_with_progress(path, None, &mut |_, _| {})
+        Self::of_file(open_recording(path)?.into(), None, &mut |_, _| {})
     }
 
-    /// Opens a file. A scan of a file without an index calls `on_progress` with the bytes scanned
+    /// Reads the header and the index of an open file. A scan of a file without an index calls `on_progress` with the bytes scanned
     /// and the size of the file. After a signal, this and every later read ends with
     /// [`ReadError::Interrupted`].
     ///
     /// # Errors
     /// Like [`Self::open`].
-    pub fn open_with_progress(
-        path: &Path,
+    pub fn of_file(
+        file: Arc<File>,
         stop: Option<&Stop>,
         on_progress: &mut dyn FnMut(u64, u64),
     ) -> Result<Self, ReadError> {
-        let log = LogReader::open_file(path, stop.cloned())?;
+        let log = LogReader::of_file(Arc::clone(&file), stop)?;
         log.selection().require(&ContentSelection::FOR_PICTURES, "a reader of single steps")?;
         log.selection().require_all_particles("a reader of single steps")?;
         let (limits, format_version) = (log.limits(), log.format_version());
         let (run, scene) = (log.run().clone(), log.scene().to_vec());
-        let file = open_regular_file(path)?;
         let size_bytes = file.metadata()?.len();
         let summary = summary::read(&file, size_bytes, stop)?;
         let has_index = summary.is_some();
@@ -162,23 +161,12 @@ impl IndexedLog {
         Ok(())
     }
 
-    /// Returns another reader of the same file, for another thread.
+    /// Returns a reader of the same file from its start, until a signal arrives.
     ///
     /// # Errors
     /// If the operating system reports an error.
-    pub fn try_clone(&self) -> Result<Self, ReadError> {
-        Ok(Self {
-            file: self.file.try_clone()?,
-            format_version: self.format_version,
-            run: self.run.clone(),
-            scene: self.scene.clone(),
-            limits: self.limits,
-            stop: self.stop.clone(),
-            channels: self.channels.clone(),
-            chunks: self.chunks.clone(),
-            end: self.end.clone(),
-            has_index: self.has_index,
-        })
+    pub fn reader(&self, stop: &Stop) -> Result<LogReader<FileSource>, ReadError> {
+        LogReader::of_file(Arc::clone(&self.file), Some(stop))
     }
 
     /// Returns the version of the format of the file.
@@ -238,7 +226,6 @@ impl IndexedLog {
             )));
         }
         let mut bytes = vec![0; usize::try_from(size_bytes).unwrap_or(usize::MAX)];
-        // Independent of the file position, which a clone shares.
         match self.file.read_exact_at(&mut bytes, offset) {
             Err(error) if error.kind() == ErrorKind::UnexpectedEof => {
                 return Err(damaged("the file is shorter than its index says".to_owned()));

@@ -6,6 +6,7 @@ mod digest;
 mod load;
 mod search;
 
+use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -16,6 +17,7 @@ use super::index::IndexedLog;
 use super::read::file_source::FileSource;
 use super::read::frames::FrameReader;
 use super::read::read_error::{LogEnd, ReadError};
+use super::read::reader::open_recording;
 use super::rows::{
     CollidersRow, ForcesRow, ParametersRow, StatusRow, StepRow, SurfaceRow, TopologyRow, bend_state,
 };
@@ -94,7 +96,19 @@ impl Tape {
         stop: Option<&Stop>,
         on_progress: &mut dyn FnMut(u64, u64),
     ) -> Result<Self, TapeError> {
-        let mut log = IndexedLog::open_with_progress(path, stop, on_progress)?;
+        Self::of_file(open_recording(path)?.into(), stop, on_progress)
+    }
+
+    /// Reads a file that is open, like [`Tape::open`].
+    ///
+    /// # Errors
+    /// Like [`Tape::open`].
+    pub fn of_file(
+        file: Arc<File>,
+        stop: Option<&Stop>,
+        on_progress: &mut dyn FnMut(u64, u64),
+    ) -> Result<Self, TapeError> {
+        let mut log = IndexedLog::of_file(file, stop, on_progress)?;
         let load = read_load(&mut log)?;
         let is_damaged = load.has_damage || *log.end() != LogEnd::Complete;
         let missing = |topic| TapeError::NoLoad { topic, is_damaged };
@@ -272,7 +286,7 @@ impl Tape {
         let before = step.checked_sub(1).map(|step| self.find(step)).transpose()?.flatten();
         let earliest = before.map_or(early, |before| before.chunk.min(early));
         for chunk in [earliest, early, chunk] {
-            frames.go_to(&self.log().chunk_start(chunk))?;
+            frames.go_to(&self.log().chunk_start(chunk));
             if frames.skip_to(step)? {
                 break;
             }
@@ -281,12 +295,9 @@ impl Tape {
     }
 
     /// Makes a reader of the same file continue at the first message.
-    ///
-    /// # Errors
-    /// If the operating system reports an error.
-    pub fn rewind(&self, frames: &mut FrameReader<FileSource>) -> Result<(), ReadError> {
+    pub fn rewind(&self, frames: &mut FrameReader<FileSource>) {
         // A tape has a snapshot, so there is a chunk.
-        frames.go_to(&self.log().chunk_start(0))
+        frames.go_to(&self.log().chunk_start(0));
     }
 
     fn find(&mut self, step: u64) -> Result<Option<SnapshotPosition>, ReadError> {

@@ -300,7 +300,7 @@ impl Recording {
         self.require_step(step)?;
         let state = run_until_signal(py, |signal| {
             self.with(|tape| {
-                let state = complete_state(&self.path, tape, step, u64::MAX, signal);
+                let state = complete_state(tape, step, u64::MAX, signal);
                 state.map_err(|error| self.error(&error))
             })
         })??;

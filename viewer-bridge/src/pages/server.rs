@@ -114,7 +114,7 @@ impl Server {
         let state = Arc::new(ServerState { sessions, assets: self.assets });
         let router = guarded(router(Arc::clone(&state)), self.guard);
         self.listener.serve(router, pages, &shutdown).await;
-        state.sessions.replays.end().await;
+        state.sessions.replays.end();
     }
 }
 

@@ -11,7 +11,7 @@ use super::connection::{Acknowledged, Connection, NextFrame};
 use super::history::PastMessages;
 use super::hub::Hub;
 use super::recordings::Recordings;
-use super::replays::Replays;
+use super::replays::{HeldReplay, Replays};
 use crate::limits::{HELLO_TIMEOUT, PROTOCOL};
 use crate::message::{Command, FromPage, Hello, OutcomeText, Refusal, ToPage, Wish, check};
 use crate::request::{ClientId, RequestKind};
@@ -49,6 +49,8 @@ struct Venue {
     /// Those that its pages can start.
     recordings: Option<Arc<Recordings>>,
     shutdown: Shutdown,
+    /// Keeps the recording open.
+    _replay: Option<HeldReplay>,
 }
 
 impl Sessions {
@@ -56,11 +58,13 @@ impl Sessions {
     async fn venue(&self, recording: Option<&str>) -> Result<Venue, End> {
         let Some(name) = recording else {
             let (hub, recordings) = (Arc::clone(&self.hub), self.recordings.clone());
-            return Ok(Venue { hub, recordings, shutdown: self.shutdown.clone() });
+            let shutdown = self.shutdown.clone();
+            return Ok(Venue { hub, recordings, shutdown, _replay: None });
         };
         let opened = self.replays.open(name).await;
-        let (hub, shutdown) = opened.map_err(|reason| End::closed(NO_RECORDING, reason))?;
-        Ok(Venue { hub, recordings: None, shutdown })
+        let replay = opened.map_err(|reason| End::closed(NO_RECORDING, reason))?;
+        let (hub, shutdown) = (Arc::clone(&replay.hub), replay.shutdown.clone());
+        Ok(Venue { hub, recordings: None, shutdown, _replay: Some(replay) })
     }
 }
 

@@ -69,14 +69,14 @@ impl Replay {
         Ok(Self { recording, ghosts, start })
     }
 
-    fn job(&self) -> anyhow::Result<Job> {
+    fn job(&self) -> Job {
         let Recording { tape, first, .. } = &self.recording;
-        Ok(Job {
-            log: tape.log().try_clone()?,
+        Job {
+            log: tape.log().clone(),
             first: first.row,
             last_step: tape.last_step(),
             torn: tape.topology().torn_before(),
-        })
+        }
     }
 }
 
@@ -97,7 +97,7 @@ impl Source for Replay {
     }
 
     fn run(&mut self, sinks: &Sinks, requests: &Requests) -> anyhow::Result<()> {
-        let (job, file) = (self.job()?, self.recording.file.clone());
+        let (job, file) = (self.job(), self.recording.file.clone());
         let (sender, reports) = channel();
         let is_cancelled = AtomicBool::new(false);
         thread::scope(|scope| {

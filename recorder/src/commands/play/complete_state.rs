@@ -1,7 +1,5 @@
 //! The complete state of a step in the middle of a recording, simulated from the last keyframe before it.
 
-use std::path::Path;
-
 use recorder::{CompleteStateError, RecordedSceneError, Tape, complete_state};
 use sim_contract::Stop;
 
@@ -11,13 +9,11 @@ const PARTICLE_STEPS_MAX: u64 = 100_000_000;
 
 /// Returns the keyframe of a recorded step: its own, or the one that a simulation from the last keyframe
 /// before it gives. Returns `None` if that does not lead to the recorded particles: after missing
-/// commands, with another version of the solver, or where the recording is damaged. `path` is the file of
-/// `tape`.
+/// commands, with another version of the solver, or where the recording is damaged.
 ///
 /// # Errors
 /// If the file cannot be read.
 pub(super) fn keyframe_of(
-    path: &Path,
     tape: &mut Tape,
     step: u64,
     stop: &Stop,
@@ -27,7 +23,7 @@ pub(super) fn keyframe_of(
         return Ok(Some(bytes));
     }
     let steps_max = PARTICLE_STEPS_MAX / u64::from(tape.run().particle_count).max(1);
-    match complete_state(path, tape, step, steps_max, stop) {
+    match complete_state(tape, step, steps_max, stop) {
         Ok(state) => Ok(Some(state.keyframe)),
         Err(CompleteStateError::Read(error)) => Err(error.into()),
         Err(CompleteStateError::Tape(error)) => Err(error.into()),

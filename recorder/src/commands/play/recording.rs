@@ -1,11 +1,12 @@
 //! One file of a replay, read forward from any step.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use anyhow::Context;
 use recorder::{
     CollidersRow, ContentSelection, FileSource, Frame, FrameReader, LogEnd, LogReader, Message,
-    RunDescription, StepRow, Tape, recorded_scene, torn_before_first,
+    RunDescription, StepRow, Tape, open_recording, recorded_scene, torn_before_first,
 };
 use sim_contract::{BendState, Method, Stop};
 use sim_solver::Solver;
@@ -74,15 +75,16 @@ impl Start {
 impl Recording {
     /// Opens a file at its first snapshot. Errors do not name the file.
     pub(super) fn open(path: &Path, stop: &Stop) -> anyhow::Result<Self> {
-        let log = LogReader::open_until(path, stop)?;
+        let file = Arc::new(open_recording(path)?);
+        let log = LogReader::of_file(Arc::clone(&file), Some(stop))?;
         log.selection().require(&ContentSelection::FOR_STATES, "`recorder play`")?;
         log.selection().require_all_particles("`recorder play`")?;
         // Names the problem of a file whose readable part has no snapshot.
         let mut frames = FrameReader::new(log);
         let first = next_frame(path, &mut frames)?;
         let collider_count = first_colliders(&first).map(|row| row.colliders.len());
-        let tape = Tape::open(path, Some(stop), &mut |_, _| {})?;
-        tape.rewind(&mut frames)?;
+        let tape = Tape::of_file(file, Some(stop), &mut |_, _| {})?;
+        tape.rewind(&mut frames);
         Ok(Self {
             path: path.to_owned(),
             frames,
@@ -151,7 +153,7 @@ impl Recording {
 
     /// Continues with the first snapshot.
     pub(super) fn start(&mut self) -> anyhow::Result<Start> {
-        self.tape.rewind(&mut self.frames)?;
+        self.tape.rewind(&mut self.frames);
         let frame = next_frame(&self.path, &mut self.frames)?;
         let torn = torn_before_first(self.tape.topology(), &frame);
         let mut position = Position::new(torn, self.method());
@@ -190,7 +192,7 @@ impl Recording {
     /// Returns the keyframe of a recorded step, simulated if it has none of its own; `None` if the recording
     /// does not lead to it.
     pub(super) fn keyframe_of(&mut self, step: u64) -> anyhow::Result<Option<Vec<u8>>> {
-        keyframe_of(&self.path, &mut self.tape, step, &self.stop)
+        keyframe_of(&mut self.tape, step, &self.stop)
     }
 
     /// Returns the next snapshot, or `None` at the end of the readable part. Warns of the first gap before one,

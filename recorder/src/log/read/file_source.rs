@@ -2,7 +2,9 @@
 
 use std::fmt;
 use std::fs::File;
-use std::io::{self, BufReader, Read, Seek, SeekFrom};
+use std::io::{self, BufReader, Read};
+use std::os::unix::fs::FileExt;
+use std::sync::Arc;
 
 use sim_contract::Stop;
 
@@ -12,9 +14,24 @@ const BUFFER_SIZE_BYTES: usize = 1 << 20;
 /// A file that is read until a signal arrives.
 #[derive(Debug)]
 pub struct FileSource {
-    file: BufReader<File>,
+    file: BufReader<SharedFile>,
     /// `None` if the program does not handle signals.
     stop: Option<Stop>,
+}
+
+/// A file that several readers share, each with a position of its own.
+#[derive(Debug)]
+struct SharedFile {
+    file: Arc<File>,
+    position: u64,
+}
+
+impl Read for SharedFile {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let count = self.file.read_at(buffer, self.position)?;
+        self.position += count as u64;
+        Ok(count)
+    }
 }
 
 /// The content of the error of a read after a signal.
@@ -30,13 +47,16 @@ impl fmt::Display for Interrupted {
 impl std::error::Error for Interrupted {}
 
 impl FileSource {
-    pub(super) fn new(file: File, stop: Option<Stop>) -> Self {
+    pub(super) fn new(file: Arc<File>, stop: Option<Stop>) -> Self {
+        let file = SharedFile { file, position: 0 };
         Self { file: BufReader::with_capacity(BUFFER_SIZE_BYTES, file), stop }
     }
 
     /// Continues at a byte of the file.
-    pub(super) fn go_to(&mut self, byte: u64) -> io::Result<()> {
-        self.file.seek(SeekFrom::Start(byte)).map(|_| ())
+    pub(super) fn go_to(&mut self, byte: u64) {
+        let file = Arc::clone(&self.file.get_ref().file);
+        let file = SharedFile { file, position: byte };
+        self.file = BufReader::with_capacity(BUFFER_SIZE_BYTES, file);
     }
 }
 

@@ -65,13 +65,12 @@ pub struct FrameReader<R> {
 
 impl FrameReader<FileSource> {
     /// Continues at a chunk.
-    pub(in crate::log) fn go_to(&mut self, chunk: &ChunkStart<'_>) -> Result<(), ReadError> {
-        self.log.go_to(chunk)?;
+    pub(in crate::log) fn go_to(&mut self, chunk: &ChunkStart<'_>) {
+        self.log.go_to(chunk);
         self.backlog = Backlog::new(self.log.run(), self.log.scene().len());
         self.updates.clear();
         self.log_times_ns.clear();
         (self.row, self.next) = (None, None);
-        Ok(())
     }
 
     /// Skips to the end of the snapshot of a step. The next frame has the messages of later steps that

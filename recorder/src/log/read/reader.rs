@@ -1,8 +1,10 @@
 //! Reads a recording from its start, with every checksum verified, as far as the file goes.
 
 use std::collections::BTreeMap;
+use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
+use std::sync::Arc;
 
 use mcap::records::{AttachmentHeader, Header, MessageHeader, Record, op};
 use sim_contract::{ParticleState, Stop, part_path};
@@ -50,7 +52,7 @@ impl LogReader<FileSource> {
     /// # Errors
     /// If the file is not a recording or has no readable header.
     pub fn open(path: &Path) -> Result<Self, ReadError> {
-        Self::open_file(path, None)
+        Self::of_file(open_recording(path)?.into(), None)
     }
 
     /// Opens a file and reads its header. After a signal, this and every later read ends with
@@ -59,12 +61,15 @@ impl LogReader<FileSource> {
     /// # Errors
     /// Like [`LogReader::open`], and after a signal.
     pub fn open_until(path: &Path, stop: &Stop) -> Result<Self, ReadError> {
-        Self::open_file(path, Some(stop.clone()))
+        Self::of_file(open_recording(path)?.into(), Some(stop))
     }
 
-    pub(in crate::log) fn open_file(path: &Path, stop: Option<Stop>) -> Result<Self, ReadError> {
-        let file = open_regular_file(path).map_err(|cause| open_error(path, cause))?;
-        Self::new(FileSource::new(file, stop))
+    /// Reads a file that is open, and that other readers may share.
+    ///
+    /// # Errors
+    /// Like [`LogReader::open_until`].
+    pub fn of_file(file: Arc<File>, stop: Option<&Stop>) -> Result<Self, ReadError> {
+        Self::new(FileSource::new(file, stop.cloned()))
     }
 }
 
@@ -79,13 +84,21 @@ pub(in crate::log) struct ChunkStart<'a> {
 
 impl LogReader<FileSource> {
     /// Continues at a chunk. An audit ends, because it compares the whole file.
-    pub(in crate::log) fn go_to(&mut self, chunk: &ChunkStart<'_>) -> Result<(), ReadError> {
-        self.records.go_to(chunk.byte)?;
+    pub(in crate::log) fn go_to(&mut self, chunk: &ChunkStart<'_>) {
+        self.records.go_to(chunk.byte);
         self.channels.extend(chunk.channels);
         self.closing = None;
         self.audit = None;
-        Ok(())
     }
+}
+
+/// Opens a recording for readers that share the file, so that all of them read the same one, also if another file
+/// gets its name.
+///
+/// # Errors
+/// If the path is not a regular file or the operating system reports an error.
+pub fn open_recording(path: &Path) -> Result<File, ReadError> {
+    open_regular_file(path).map_err(|cause| open_error(path, cause))
 }
 
 /// Names the unfinished part of a recording that does not exist yet.

@@ -3,7 +3,7 @@
 //! This reader owns the framing of the file, so that it can compare each length with the limits of
 //! the scene before anything is allocated, and decompresses each chunk at once. The mcap crate parses records.
 
-use std::io::{self, Read};
+use std::io::Read;
 use std::ops::Range;
 
 use mcap::McapError;
@@ -56,12 +56,11 @@ enum Part {
 
 impl RecordReader<FileSource> {
     /// Continues with the record that begins at a byte of the file.
-    pub(in crate::log) fn go_to(&mut self, byte: u64) -> io::Result<()> {
-        self.source.go_to(byte)?;
+    pub(in crate::log) fn go_to(&mut self, byte: u64) {
+        self.source.go_to(byte);
         self.chunk.clear();
         self.intact_count = byte;
         self.end = None;
-        Ok(())
     }
 }
 

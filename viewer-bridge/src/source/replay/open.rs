@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::io::ErrorKind;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use anyhow::{Context, anyhow, bail};
 use recorder::{LogEnd, ReadError, Tape, TapeError, TapeState};
@@ -23,7 +23,6 @@ pub(super) struct Recording {
     pub(super) load: Load,
     /// The state at the first step.
     pub(super) first: TapeState,
-    pub(super) path: PathBuf,
     /// Name of the file without its folder, which clients need not know.
     pub(super) file: String,
 }
@@ -67,7 +66,7 @@ pub(super) fn open(
     }
     let load = load_of(&tape)?;
     let first = tape.state_at(tape.first_step()).map_err(|error| with_remedy(path, error))?;
-    Ok(Recording { tape, load, first, path: path.to_owned(), file: file_of(path) })
+    Ok(Recording { tape, load, first, file: file_of(path) })
 }
 
 /// Returns the file of a path without its folder, which clients need not know.

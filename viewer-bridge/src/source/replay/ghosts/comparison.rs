@@ -1,10 +1,9 @@
 //! Finds the first step at which two recordings differ.
 
 use std::cmp::Ordering;
-use std::path::Path;
 
 use recorder::verification::{SnapshotDifference, snapshot_difference};
-use recorder::{FileSource, Frame, FrameReader, LogEnd, LogReader, ReadError};
+use recorder::{Frame, FrameReader, IndexedLog, LogEnd, ReadError};
 use sim_contract::Stop;
 
 /// The result of a comparison, up to the first difference.
@@ -31,11 +30,11 @@ pub(super) struct FirstDifference {
 /// # Errors
 /// A file cannot be read, or a signal has arrived.
 pub(super) fn compare(
-    paths: [&Path; 2],
+    [a, b]: [&IndexedLog; 2],
     stop: &Stop,
     mut on_step: impl FnMut(u64) -> bool,
 ) -> Result<Compared, ReadError> {
-    let [mut a, mut b] = [open(paths[0], stop)?, open(paths[1], stop)?];
+    let [mut a, mut b] = [FrameReader::new(a.reader(stop)?), FrameReader::new(b.reader(stop)?)];
     let mut compared = Compared::default();
     let (mut frame_a, mut frame_b) = (a.next_frame()?, b.next_frame()?);
     while let (Some(one), Some(other)) = (&frame_a, &frame_b) {
@@ -59,10 +58,6 @@ pub(super) fn compare(
     }
     compared.ends = [a, b].map(|reader| end_text(reader.end()));
     Ok(compared)
-}
-
-fn open(path: &Path, stop: &Stop) -> Result<FrameReader<FileSource>, ReadError> {
-    LogReader::open_until(path, stop).map(FrameReader::new)
 }
 
 fn end_text(end: Option<&LogEnd>) -> String {

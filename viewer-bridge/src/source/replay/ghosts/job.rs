@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Sender;
 
 use anyhow::{Context, bail};
-use recorder::Tape;
+use recorder::{IndexedLog, Tape};
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{ConstraintState, Stop};
 
@@ -29,7 +29,7 @@ pub(super) enum Report {
 /// The recording on show.
 #[derive(Debug)]
 pub(super) struct Shown {
-    path: PathBuf,
+    log: IndexedLog,
     file: String,
     particle_count: u32,
     rate_hz: u32,
@@ -41,7 +41,7 @@ impl Shown {
     pub(super) fn from_recording(recording: &Recording) -> Self {
         let run = recording.tape.run();
         Self {
-            path: recording.path.clone(),
+            log: recording.tape.log().clone(),
             file: recording.file.clone(),
             particle_count: run.particle_count,
             rate_hz: run.rate_hz,
@@ -108,6 +108,7 @@ impl Job {
         let ghost = open::open(&self.path, &self.stop, &mut |_| {})?;
         self.shown.check(&ghost)?;
         let (first, last) = (ghost.tape.first_step(), ghost.tape.last_step());
+        let log = ghost.tape.log().clone();
         let _sent = reports.send(Report::Opened(Box::new(ghost.tape)));
         let mut next_report_ns = monotonic_ns();
         let on_step = |step: u64| {
@@ -121,7 +122,7 @@ impl Job {
             }
             !is_cancelled()
         };
-        compare([&self.shown.path, &self.path], &self.stop, on_step).context("comparing")
+        compare([&self.shown.log, &log], &self.stop, on_step).context("comparing")
     }
 
     /// Puts the result into words.
