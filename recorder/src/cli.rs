@@ -1,6 +1,5 @@
 //! Options, output and exit codes that several subcommands share.
 
-pub(crate) mod counted;
 pub(crate) mod damaged_input;
 pub(crate) mod endpoint_args;
 pub(crate) mod exit;

@@ -52,6 +52,7 @@
 #![forbid(unsafe_code)]
 
 mod complete_state;
+mod counted;
 mod log;
 pub mod pictures;
 #[cfg(test)]
@@ -64,6 +65,7 @@ mod state_place;
 pub mod verification;
 
 pub use complete_state::{CompleteState, CompleteStateError, complete_state};
+pub use counted::counted;
 pub use log::*;
 pub use recorded_scene::{RecordedSceneError, recorded_scene, scene_to_simulate};
 pub use scene_drawing::{DrawnMesh, SCENE_TOPIC, SceneDrawing};

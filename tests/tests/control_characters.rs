@@ -100,7 +100,7 @@ fn a_recording_cannot_control_the_terminal() {
     let file = recording(&sandbox);
     run(&sandbox, Program::Recorder, &["info", &file]).success();
     run(&sandbox, Program::Recorder, &["info", &file, "--json"]).success();
-    assert_eq!(run(&sandbox, Program::Recorder, &["verify", &file]).code, Some(3));
+    assert_eq!(run(&sandbox, Program::Recorder, &["verify", "-v", &file]).code, Some(3));
     assert_eq!(run(&sandbox, Program::Recorder, &["verify", &file, "--json"]).code, Some(3));
 }
 

@@ -64,6 +64,16 @@ pub(crate) fn warn_incomplete(path: &Path, end: &LogEnd, done: &str) {
     }
 }
 
+/// Warns about a name by which other programs, and `viewer-bridge`, do not find a recording.
+pub(crate) fn warn_of_extension(path: &Path) {
+    if path.extension().is_none_or(|extension| !extension.eq_ignore_ascii_case("mcap")) {
+        note(&format!(
+            "warning: programs expect a recording to end in .mcap, unlike {}",
+            path_text(path)
+        ));
+    }
+}
+
 /// Describes what is left of a recording after an error of writing.
 pub(crate) fn incomplete(recording: &str, part_path: &Path) -> String {
     let is_empty = std::fs::metadata(part_path).is_ok_and(|part| part.len() == 0);

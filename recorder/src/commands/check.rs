@@ -4,11 +4,12 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use recorder::{CheckExtent, CheckReport, Finding, ReadError, check_file, open_regular_file};
+use recorder::{
+    CheckExtent, CheckReport, Finding, ReadError, check_file, counted, open_regular_file,
+};
 use serde::Serialize;
 use sim_contract::{Stop, printable_line};
 
-use crate::cli::counted::counted;
 use crate::cli::exit::Exit;
 use crate::cli::output::{self, AsJson};
 use crate::cli::progress::progress_bytes;

@@ -20,7 +20,7 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use anyhow::{anyhow, bail};
-use recorder::{Existing, PartFile, Topic};
+use recorder::{Existing, PartFile, Topic, counted};
 use sim_contract::clock::{SECOND_NS, monotonic_ns, realtime_ns, sleep_until};
 use sim_contract::{
     AttachError, Domain, Endpoint, LockstepError, NodeAnswer, OwnerState, SNAPSHOTS_BUFFERED, Stop,
@@ -61,6 +61,9 @@ const IGNORED_SIGNAL: &str = "warning: SIGUSR1 writes the memory of a black box,
 
 pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
     args.check().unwrap_or_else(|error| exit::with_usage(&error));
+    if let Some(output) = &args.output {
+        output::warn_of_extension(output);
+    }
     let stop = Stop::install()?;
     report_bus_errors()?;
     let endpoint = args.endpoint.endpoint()?;
@@ -146,8 +149,9 @@ fn names(args: &RecordArgs, endpoint: &Endpoint) -> anyhow::Result<(FileNames, V
     let count = names.check(args.file.existing())?;
     if count > 0 {
         let path = output::path_text(&names.path(0));
+        let files = counted(count as u64, "file");
         output::note(&format!(
-            "warning: {count} files of an earlier recording are beside {path}; each stays until a file with its \
+            "warning: beside {path}, there is an earlier recording with {files}; each stays until a file with its \
              number begins"
         ));
     }

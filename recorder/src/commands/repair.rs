@@ -8,13 +8,12 @@ use std::path::PathBuf;
 use anyhow::Context;
 use recorder::{
     AfterEnd, Finding, LoadRows, PartFile, ReadError, RepairReport, SCENE_ATTACHMENT, SurfaceRow,
-    Topic, TopologyRow, bend_state, constraint_state, open_regular_file, repair_file,
+    Topic, TopologyRow, bend_state, constraint_state, counted, open_regular_file, repair_file,
 };
 use serde::Serialize;
 use sim_contract::{LoadHeader, Stop, Triangle, is_being_written, printable_line};
 use sim_solver::{Scene, Solver};
 
-use crate::cli::counted::counted;
 use crate::cli::exit::Exit;
 use crate::cli::file_args::{OverwriteArgs, refuse_own_input};
 use crate::cli::output::{self, AsJson};
@@ -71,6 +70,7 @@ struct Repaired<'a> {
 }
 
 pub(crate) fn run(args: &RepairArgs) -> anyhow::Result<Exit> {
+    output::warn_of_extension(&args.output);
     let stop = Stop::install()?;
     let (input, output) = (output::path_text(&args.input), output::path_text(&args.output));
     let open =

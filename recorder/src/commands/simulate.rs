@@ -102,6 +102,9 @@ pub(crate) fn run(args: &SimulateArgs) -> anyhow::Result<Exit> {
     if let Some(problem) = args.misplaced_change() {
         with_usage(&clap::Error::raw(ErrorKind::ArgumentConflict, problem));
     }
+    if let Some(output) = &args.output {
+        output::warn_of_extension(output);
+    }
     let stop = Stop::install()?;
     match args.steps {
         Some(steps) => run_scene(args, steps, &stop),

@@ -21,8 +21,8 @@ use crate::cli::thread_args::ThreadArgs;
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Compares everything that a recorder writes, also where the checksums are gone, \
-    and lists the messages that are missing and the content that nothing else in the file can \
-    contradict. Behind missing outcomes, it goes on from the next complete state.\n\n\
+    and lists the messages that are missing. --verbose also lists the content that is not compared, because \
+    nothing else in the file can contradict it. Behind missing outcomes, it goes on from the next complete state.\n\n\
     Exit codes: 0 every recorded step is bit-identical; 1 not verifiable; 3 different, outcomes missing, or file truncated \
     or damaged.\n\nExamples:\n  \
     recorder verify run.mcap\n  \
@@ -38,6 +38,9 @@ pub(crate) struct VerifyArgs {
     /// Compare the states up to this step
     #[arg(long, value_name = "STEP", allow_hyphen_values = true, value_parser = whole_number)]
     to: Option<u64>,
+    /// Also list the content that is not compared
+    #[arg(short, long)]
+    verbose: bool,
     #[command(flatten)]
     threads: ThreadArgs,
     #[command(flatten)]
@@ -57,7 +60,7 @@ pub(crate) fn run(args: &VerifyArgs) -> anyhow::Result<Exit> {
         report.map_err(|error| explain(error, &args.file)).with_context(|| path.clone())?;
     bar.finish_and_clear();
     args.check_range(&report).with_context(|| path.clone())?;
-    output::result(args.as_json, &report, &text(&report))?;
+    output::result(args.as_json, &report, &args.text(&report))?;
     let end = report.incomplete_end();
     if let Some(end) = end {
         output::warn_incomplete(&args.file, end, "verified as far as it goes");
@@ -103,13 +106,17 @@ impl VerifyArgs {
         let place = place.with_context(|| output::path_text(&self.file))?;
         Ok(StepRange { start: place.keyframe_step, last })
     }
-}
 
-/// Returns the report for people, with the content that is not compared.
-fn text(report: &VerifyReport) -> String {
-    let lines = report.not_covered.iter().map(|what| format!("\n  {}", printable_line(what)));
-    let lost = report.lost.iter().map(|(topic, count)| format!("\nmissing: {topic} {count}"));
-    let gaps = report.gaps.iter().map(|gap| format!("\ngap: steps {}..={}", gap.from, gap.to));
-    let (gaps, lost) = (gaps.collect::<String>(), lost.collect::<String>());
-    format!("{report}{gaps}{lost}\nnot compared:{}", lines.collect::<String>())
+    /// Returns the report for people.
+    fn text(&self, report: &VerifyReport) -> String {
+        let lost = report.lost.iter().map(|(topic, count)| format!("\nmissing: {topic} {count}"));
+        let gaps = report.gaps.iter().map(|gap| format!("\ngap: steps {}..={}", gap.from, gap.to));
+        let mut text = format!("{report}{}{}", gaps.collect::<String>(), lost.collect::<String>());
+        if self.verbose {
+            let lines =
+                report.not_covered.iter().map(|what| format!("\n  {}", printable_line(what)));
+            text += &format!("\nnot compared:{}", lines.collect::<String>());
+        }
+        text
+    }
 }

@@ -93,7 +93,7 @@ fn an_unknown_cause_of_a_tear_is_named_as_not_compared() {
         vec![message]
     });
     assert_identical(&report);
-    let words = "the causes of 1 tears that the recording calls unknown".to_owned();
+    let words = "the causes of 1 tear, which the recording calls unknown".to_owned();
     assert!(report.not_covered.contains(&words), "{:?}", report.not_covered);
 }
 

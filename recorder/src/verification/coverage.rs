@@ -1,5 +1,6 @@
 //! The content of a recording that a verification does not compare.
 
+use crate::counted;
 use crate::log::Topic;
 
 /// Content that a file has only once, so that nothing in it can contradict an edit.
@@ -68,24 +69,27 @@ impl Coverage {
         }
         if self.given_count > 0 {
             let count = self.given_count;
-            all.push(format!("{count} states taken from the file, which a command put in place"));
+            let states = counted(count, "state");
+            all.push(format!("{states} taken from the file, which a command put in place"));
         }
         if self.skipped_count > 0 {
-            let count = self.skipped_count;
-            all.push(format!("{count} snapshots before the state to start from"));
+            let snapshots = counted(self.skipped_count, "snapshot");
+            all.push(format!("{snapshots} before the state to start from"));
         }
         if let Some(step) = self.last_step {
             all.push(format!("everything after step {step}, the last one to compare"));
         }
         if self.earlier_count > 0 {
-            all.push(format!("{} messages that precede the first state", self.earlier_count));
+            let messages = counted(self.earlier_count as u64, "message");
+            all.push(format!("{messages} before the first state"));
         }
         if self.trailing_count > 0 {
-            all.push(format!("{} messages after the last snapshot", self.trailing_count));
+            let messages = counted(self.trailing_count as u64, "message");
+            all.push(format!("{messages} after the last snapshot"));
         }
         if self.unknown_cause_count > 0 {
-            let count = self.unknown_cause_count;
-            all.push(format!("the causes of {count} tears that the recording calls unknown"));
+            let tears = counted(self.unknown_cause_count as u64, "tear");
+            all.push(format!("the causes of {tears}, which the recording calls unknown"));
         }
         all.extend(self.foreign.iter().map(|name| format!("{name}, which no recorder writes")));
         all

@@ -8,6 +8,7 @@ use sim_contract::printable_line;
 
 use super::difference::Difference;
 use super::finding::{SnapshotFinding, StepGap};
+use crate::counted;
 use crate::log::LogEnd;
 
 /// The result of a verification. It serializes to the JSON that `recorder verify --json` prints.
@@ -131,25 +132,26 @@ impl VerifyReport {
 
 impl fmt::Display for VerifyReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let count = self.steps_identical;
+        let steps = |kind: &str| counted(self.steps_identical, &format!("{kind}step"));
         let what = printable_line(self.what.as_deref().unwrap_or(""));
         let step = self.step.unwrap_or(0);
         match self.verdict {
             Verdict::Identical => {
                 let last = self.last_identical_step.unwrap_or(self.first_step);
-                write!(f, "{count} steps bit-identical ({}..={last})", self.first_step)
+                write!(f, "{} bit-identical ({}..={last})", steps(""), self.first_step)
             }
             Verdict::Diverged if self.step.is_none() => {
-                write!(f, "the file differs: {what} ({count} steps bit-identical)")
+                write!(f, "the file differs: {what} ({} bit-identical)", steps(""))
             }
             Verdict::Diverged => {
-                write!(f, "step {step} differs: {what} ({count} steps before it bit-identical)")
+                write!(f, "step {step} differs: {what} ({} before it bit-identical)", steps(""))
             }
             Verdict::OutcomeLogIncomplete => write!(
                 f,
-                "outcome log incomplete from step {step}: {what} ({count} other steps bit-identical)"
+                "outcome log incomplete from step {step}: {what} ({} bit-identical)",
+                steps("other ")
             ),
-            Verdict::Interrupted => write!(f, "interrupted; {count} steps so far bit-identical"),
+            Verdict::Interrupted => write!(f, "interrupted; {} so far bit-identical", steps("")),
         }
     }
 }

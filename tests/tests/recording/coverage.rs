@@ -9,7 +9,9 @@ fn a_verification_names_the_content_that_it_does_not_compare() {
     let file = sandbox.path("run.mcap");
     let args = ["simulate", "pendulum", "--steps", "10", "-o", &file];
     Process::run(Program::Recorder, &sandbox, &args).success();
-    let text = Process::run(Program::Recorder, &sandbox, &["verify", &file]).success();
+    let verdict = Process::run(Program::Recorder, &sandbox, &["verify", &file]).success();
+    assert_eq!(verdict, "10 steps bit-identical (0..=10)\n", "the verdict stands alone");
+    let text = Process::run(Program::Recorder, &sandbox, &["verify", &file, "-v"]).success();
     let lines: Vec<_> = text.lines().collect();
     assert_eq!(lines[..2], ["10 steps bit-identical (0..=10)", "not compared:"]);
     let report = Process::run(Program::Recorder, &sandbox, &["verify", &file, "--json"]).json();

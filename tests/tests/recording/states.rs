@@ -92,7 +92,7 @@ fn a_state_continues_in_another_process_with_the_same_hashes() {
     assert!(restored.contains("the state of step 240, "), "{restored}");
     end_after(&sandbox, recording, &again);
     node.interrupt().success();
-    let verified = recorder(&sandbox, &["verify", &again]);
+    let verified = recorder(&sandbox, &["verify", "-v", &again]);
     assert!(verified.starts_with("494 steps bit-identical (0..=494)"), "{verified}");
     // The state of the state file is one that the run had computed.
     assert!(verified.contains("2 states taken from the file"), "{verified}");
@@ -218,8 +218,8 @@ fn a_client_gives_positions_and_velocities_and_the_rest_stays() {
     ctl(&sandbox, &["step", "100"]);
     end_after(&sandbox, recording, &file);
     node.interrupt().success();
-    let verified = recorder(&sandbox, &["verify", &file]);
-    assert!(verified.contains("1 states taken from the file"), "{verified}");
+    let verified = recorder(&sandbox, &["verify", "-v", &file]);
+    assert!(verified.contains("1 state taken from the file"), "{verified}");
     let rows = frames(&file).into_iter().flat_map(|frame| frame.updates);
     let tears = rows.filter(|update| matches!(update, Message::Tears(_)));
     assert_eq!(tears.map(|update| update.step()).collect::<Vec<_>>(), [1], "torn once");

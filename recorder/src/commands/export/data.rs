@@ -3,10 +3,9 @@
 use std::fmt;
 use std::path::Path;
 
-use recorder::Existing;
+use recorder::{Existing, counted};
 use serde::Serialize;
 
-use crate::cli::counted::counted;
 use crate::cli::output;
 use crate::export::data::written_files::WrittenFiles;
 use crate::export::data::{csv, foxglove, npz, obj, pc2, ros2, usda, vtk};

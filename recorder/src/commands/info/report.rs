@@ -3,12 +3,11 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
-use recorder::RunDescription;
+use recorder::{RunDescription, counted};
 use serde::Serialize;
 use sim_contract::printable_line;
 
 use super::timing::Timing;
-use crate::cli::counted::counted;
 
 /// The content of a recording, as printed.
 #[derive(Debug, Serialize)]

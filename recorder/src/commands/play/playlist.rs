@@ -3,14 +3,13 @@
 use std::path::PathBuf;
 
 use anyhow::Context;
-use recorder::{ContentSelection, Frame, LogEnd, RunDescription, StepRow};
+use recorder::{ContentSelection, Frame, LogEnd, RunDescription, StepRow, counted};
 use sim_contract::Stop;
 use sim_contract::clock::SECOND_NS;
 
 use super::position::Position;
 use super::recording::{Recording, Start};
 use super::replay::Recorded;
-use crate::cli::counted::counted;
 use crate::cli::output;
 
 /// A recorded step of a file.

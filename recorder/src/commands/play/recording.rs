@@ -6,7 +6,7 @@ use std::sync::Arc;
 use anyhow::Context;
 use recorder::{
     CollidersRow, ContentSelection, FileSource, Frame, FrameReader, LogEnd, LogReader, Message,
-    RunDescription, StepRow, Tape, open_recording, recorded_scene, torn_before_first,
+    RunDescription, StepRow, Tape, counted, open_recording, recorded_scene, torn_before_first,
 };
 use sim_contract::{BendState, Method, Stop};
 use sim_solver::Solver;
@@ -14,7 +14,6 @@ use sim_solver::Solver;
 use super::complete_state::keyframe_of;
 use super::position::Position;
 use super::replay::Recorded;
-use crate::cli::counted::counted;
 use crate::cli::damaged_input::lacks;
 use crate::cli::output;
 

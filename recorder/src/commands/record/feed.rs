@@ -6,7 +6,7 @@ pub(crate) mod trigger;
 
 use std::sync::Arc;
 
-use recorder::{AllCounts, Closing, ContentSelection, RunDescription};
+use recorder::{AllCounts, Closing, ContentSelection, RunDescription, counted};
 use sim_contract::clock::{SECOND_NS, monotonic_ns, realtime_ns};
 use sim_contract::{LostChanges, ReadError, State, StatusFlags};
 
@@ -18,7 +18,6 @@ use super::messages::Messages;
 use super::queue::{FileEnd, Item, Queue};
 use super::split::{FileBegin, SplitArgs, WritePosition};
 use super::stop_reason::StopReason;
-use crate::cli::counted::counted;
 use crate::cli::output;
 use selector::Selector;
 use time_limit::{FirstStep, TimeLimit};

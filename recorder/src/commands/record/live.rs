@@ -5,7 +5,7 @@ use std::fmt::Write;
 use std::sync::Arc;
 
 use anyhow::Context;
-use recorder::{Closing, Topic};
+use recorder::{Closing, Topic, counted};
 use serde::Serialize;
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::console;
@@ -116,11 +116,11 @@ fn bytes_per_s(last: Sample, now: Sample) -> f64 {
 }
 
 fn text(seconds: f64, closing: &Closing, bytes_per_s: f64, queue_bytes: usize) -> String {
-    let steps = closing.counts[Topic::Steps].received;
+    let snapshots = counted(closing.counts[Topic::Steps].received, "snapshot");
     let speed = bytes_per_s / BYTES_PER_MB;
     let queue = queue_bytes as f64 / BYTES_PER_MB;
     let mut text = format!(
-        "{seconds:.1} s, {steps} snapshots in this file, {speed:.1} MB/s, {queue:.1} MB in the queue, lost"
+        "{seconds:.1} s, {snapshots} in this file, {speed:.1} MB/s, {queue:.1} MB in the queue, lost"
     );
     let missing = closing.missing();
     if missing.is_empty() {
@@ -136,7 +136,8 @@ fn text(seconds: f64, closing: &Closing, bytes_per_s: f64, queue_bytes: usize) -
 /// The line of a black box, with the number of files that it has written.
 fn black_box_text(seconds: f64, kept_bytes: u64, file_count: u64) -> String {
     let kept = kept_bytes as f64 / BYTES_PER_MB;
-    format!("{seconds:.1} s, {kept:.1} MB kept, {file_count} files written")
+    let files = counted(file_count, "file");
+    format!("{seconds:.1} s, {kept:.1} MB kept, {files} written")
 }
 
 #[cfg(test)]

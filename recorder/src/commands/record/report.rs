@@ -4,10 +4,9 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-use recorder::{AllCounts, Closing, Topic};
+use recorder::{AllCounts, Closing, Topic, counted};
 use serde::Serialize;
 
-use crate::cli::counted::counted;
 use crate::cli::output;
 
 /// The files that a recording has written.

@@ -50,7 +50,7 @@ fn every_message_that_is_repeated_anywhere_is_found_or_named_as_not_compared() {
             let is_noticed = finding.is_some()
                 || topic == Topic::Status
                     && is_named("number and the values of messages on /status")
-                || at == end && is_named("1 messages after the last snapshot");
+                || at == end && is_named("1 message after the last snapshot");
             if !is_noticed {
                 unnoticed.push(format!("record {place} on {} at {at}", topic.name()));
             }

@@ -5,6 +5,7 @@
 //! written are dropped, because no run must end for a message. A descriptor that is closed from the
 //! start is `/dev/null`.
 
+use std::borrow::Cow;
 use std::io::{self, ErrorKind, Write};
 use std::os::fd::AsFd;
 
@@ -42,9 +43,23 @@ fn has_lost_its_reader(out: &impl AsFd) -> bool {
     streams[0].revents().contains(PollFlags::ERR)
 }
 
-/// Writes a line to stderr, or drops it. Replaces line breaks and control characters in it.
+/// Longest line of a message, in bytes. A name in a file can have a million characters.
+const NOTE_SIZE_BYTES_MAX: usize = 4000;
+
+/// Writes a line to stderr, or drops it. Replaces line breaks and control characters in it, and leaves out the
+/// middle of a very long one: its start names the place, and its end the cure.
 pub fn note(text: &str) {
-    let _dropped = writeln!(io::stderr().lock(), "{}", printable_line(text));
+    let _dropped = writeln!(io::stderr().lock(), "{}", shorten(&printable_line(text)));
+}
+
+fn shorten(line: &str) -> Cow<'_, str> {
+    if line.len() <= NOTE_SIZE_BYTES_MAX {
+        return Cow::Borrowed(line);
+    }
+    let head = &line[..line.floor_char_boundary(NOTE_SIZE_BYTES_MAX / 2)];
+    let tail = &line[line.ceil_char_boundary(line.len() - NOTE_SIZE_BYTES_MAX / 2)..];
+    let count = line.len() - head.len() - tail.len();
+    Cow::Owned(format!("{head}... ({count} bytes are left out) ...{tail}"))
 }
 
 /// Writes several lines to stderr, or drops them. Replaces control characters in them.
@@ -112,6 +127,19 @@ mod tests {
         write(Failing(ErrorKind::BrokenPipe), b"text").unwrap();
         assert!(!write_or_closed(Failing(ErrorKind::BrokenPipe), b"text").unwrap());
         assert!(write_or_closed(io::sink(), b"text").unwrap());
+    }
+
+    #[test]
+    fn a_message_about_a_very_long_name_keeps_its_place_and_its_cure() {
+        let message =
+            |length| format!("error: a.toml:3: name: '{}': use a shorter one", "é".repeat(length));
+        let short = message(900);
+        assert_eq!(shorten(&short), short);
+        let cut = shorten(&message(500_000)).into_owned();
+        assert!(cut.len() < NOTE_SIZE_BYTES_MAX + 100, "{}", cut.len());
+        assert!(cut.starts_with("error: a.toml:3: name: 'éé"), "{cut}");
+        assert!(cut.ends_with("éé': use a shorter one"), "{cut}");
+        assert!(cut.contains("... (9960"), "{cut}");
     }
 
     #[test]

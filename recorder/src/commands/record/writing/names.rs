@@ -5,10 +5,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::bail;
-use recorder::{Existing, PartFileError};
+use recorder::{Existing, PartFileError, counted};
 use sim_contract::is_being_written;
 
-use crate::cli::counted::counted;
 use crate::cli::output;
 
 /// The names of the files of a recording.

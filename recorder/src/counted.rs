@@ -1,7 +1,7 @@
 //! Numbers with their nouns.
 
 /// Returns a number with its noun, such as "1 particle" or "2 particles".
-pub(crate) fn counted(count: impl Into<u64>, noun: &str) -> String {
+pub fn counted(count: impl Into<u64>, noun: &str) -> String {
     let count = count.into();
     let ending = if count == 1 { "" } else { "s" };
     format!("{count} {noun}{ending}")
