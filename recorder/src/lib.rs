@@ -53,6 +53,7 @@
 
 mod complete_state;
 mod counted;
+mod intact_parts;
 mod log;
 pub mod pictures;
 #[cfg(test)]
@@ -66,6 +67,7 @@ pub mod verification;
 
 pub use complete_state::{CompleteState, CompleteStateError, complete_state};
 pub use counted::counted;
+pub use intact_parts::{IntactParts, load_rows};
 pub use log::*;
 pub use recorded_scene::{RecordedSceneError, recorded_scene, scene_to_simulate};
 pub use scene_drawing::{DrawnMesh, SCENE_TOPIC, SceneDrawing};

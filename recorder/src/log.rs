@@ -33,7 +33,7 @@ pub use index::{ChunkEntry, IndexedLog};
 pub use message::Message;
 pub use read::audit::{Audit, AuditDifference};
 pub use read::decode::LoggedMessage;
-pub use read::file_source::FileSource;
+pub use read::file_source::{FileSource, SharedFile};
 pub use read::frames::{Frame, FrameReader};
 pub use read::gaps::GapCounter;
 pub use read::open::open_regular_file;

@@ -4,8 +4,8 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 use anyhow::anyhow;
-use recorder::{FindStateError, LogEnd};
-use sim_contract::is_being_written;
+use recorder::{FindStateError, IntactParts, LogEnd, ReadError, RepairError};
+use sim_contract::{Stop, is_being_written};
 
 /// A truncated or damaged recording that lacks what a subcommand needs. The program ends with exit code 3.
 #[derive(Debug)]
@@ -14,6 +14,13 @@ pub(crate) struct DamagedInput {
     /// The content that the readable part lacks.
     problem: String,
     end: LogEnd,
+}
+
+impl DamagedInput {
+    /// Returns the end of the readable part.
+    pub(crate) fn end(&self) -> &LogEnd {
+        &self.end
+    }
 }
 
 impl std::error::Error for DamagedInput {}
@@ -27,7 +34,7 @@ impl fmt::Display for DamagedInput {
         let path = path.display();
         write!(
             f,
-            "{problem}: the file is {end}. `recorder repair {path} OUT.mcap` copies what is intact"
+            "{problem} in its readable part: the file is {end}. `recorder repair {path} OUT.mcap` copies what is intact"
         )
     }
 }
@@ -40,6 +47,25 @@ pub(crate) fn lacks(path: &Path, problem: &str, end: Option<&LogEnd>) -> anyhow:
             let (path, problem, end) = (path.to_owned(), problem.to_owned(), end.clone());
             anyhow::Error::new(DamagedInput { path, problem, end })
         }
+    }
+}
+
+/// Returns what is intact of a recording whose readable part has an end that is not that of the file, if
+/// `saves_more` than that part.
+pub(crate) fn intact_parts(
+    path: &Path,
+    end: &LogEnd,
+    stop: &Stop,
+    saves_more: impl FnOnce(&IntactParts) -> bool,
+) -> anyhow::Result<Option<IntactParts>> {
+    if *end == LogEnd::Complete || is_being_written(path) {
+        return Ok(None);
+    }
+    match IntactParts::find(path, stop) {
+        Ok(parts) => Ok(Some(parts).filter(saves_more)),
+        Err(RepairError::Read(error @ ReadError::Interrupted)) => Err(error.into()),
+        // Then the readable part is all.
+        Err(_) => Ok(None),
     }
 }
 

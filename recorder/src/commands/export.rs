@@ -16,12 +16,12 @@ use anyhow::Context;
 use clap::error::ErrorKind;
 use recorder::pictures::{Bend, PictureOptions, Size, Style, View};
 use recorder::{
-    ContentSelection, LogEnd, LogReader, ReadError, SceneState, SceneStateError, open_regular_file,
-    visit_states,
+    ContentSelection, IntactParts, LogEnd, LogReader, ReadError, SceneState, SceneStateError,
+    open_regular_file, visit_states,
 };
 use sim_contract::Stop;
 
-use crate::cli::damaged_input::lacks;
+use crate::cli::damaged_input::{intact_parts, lacks};
 use crate::cli::exit::{self, Exit};
 use crate::cli::file_args::{OverwriteArgs, refuse_own_input};
 use crate::cli::output::{self, AsJson};
@@ -31,6 +31,7 @@ use crate::export::data::written_files::is_stdout;
 use crate::export::frame_names::FrameNames;
 use crate::export::pictures::target::Target;
 use crate::export::selection::{Choice, Moment, Selection, SnapshotRange};
+use crate::export::snapshots::OpenBytes;
 use data::DataFormat;
 use format_args::{Format, FormatArgs};
 use pictures::Pace;
@@ -59,8 +60,8 @@ const FRAMES_PER_S_DEFAULT: u16 = 25;
     snapshot.\n\n\
     Coordinates are those of the recording, in m, relative to the origin of the scene: no format \
     turns the scene.\n\n\
-    Exit codes: 0 exported; 1 failed; 3 the file is truncated or damaged and was exported as far as \
-    it goes, if at all.\n\nExamples:\n  \
+    Exit codes: 0 exported; 1 failed; 3 the file is truncated or damaged, and what is intact was \
+    exported, if anything is.\n\nExamples:\n  \
     recorder export run.mcap --png pictures\n  \
     recorder export run.mcap --png pictures --every 100ms --view front --size 1280x720\n  \
     recorder export run.mcap --svg pictures --at 1s --at 1500ms --overwrite\n  \
@@ -134,7 +135,14 @@ pub(crate) fn run(args: &ExportArgs) -> anyhow::Result<Exit> {
         output::note(&warning);
     }
     refuse_own_input(&open_regular_file(&args.file)?, format.target())?;
-    let survey = survey(args, log, &path)?;
+    let mut survey = survey(args, log, &path)?;
+    let saves_more = |parts: &IntactParts| parts.snapshot_count() > survey.steps.len() as u64;
+    let parts = intact_parts(&args.file, &survey.end, &stop, saves_more)?;
+    if let Some(parts) = &parts {
+        let end = survey.end;
+        survey = Survey::read(parts.reader()?, &path, |_| {})?;
+        survey.end = end;
+    }
     if let Format::Data(DataFormat::Ros2, folder) = format {
         let names = FrameNames::new(folder, &survey.run.scene_name, "mcap");
         refuse_own_input(&open_regular_file(&args.file)?, &names.index_path("mcap"))?;
@@ -150,12 +158,28 @@ pub(crate) fn run(args: &ExportArgs) -> anyhow::Result<Exit> {
     if let Some(warning) = survey.warning() {
         output::note(&warning);
     }
-    export(args, &survey, &steps, &format, open)?;
+    let done = match &parts {
+        None => {
+            let file = || open_regular_file(&args.file);
+            let bytes = || Ok(boxed(file()?.take(survey.intact_count)));
+            export(args, &survey, &steps, &format, open, &bytes)?;
+            "exported as far as it goes"
+        }
+        Some(parts) => {
+            let bytes = || Ok(boxed(parts.bytes()?));
+            export(args, &survey, &steps, &format, || parts.reader(), &bytes)?;
+            "exported what is intact"
+        }
+    };
     if survey.end == LogEnd::Complete {
         return Ok(Exit::Done);
     }
-    output::warn_incomplete(&args.file, &survey.end, "exported as far as it goes");
+    output::warn_incomplete(&args.file, &survey.end, done);
     Ok(Exit::Loss)
+}
+
+fn boxed(bytes: impl Read + 'static) -> Box<dyn Read> {
+    Box::new(BufReader::with_capacity(BUFFER_SIZE_BYTES, bytes))
 }
 
 /// Reads the whole recording, with a progress bar.
@@ -174,6 +198,7 @@ fn export<R: Read>(
     steps: &[u64],
     format: &Format<'_>,
     open: impl Fn() -> Result<LogReader<R>, ReadError>,
+    open_bytes: &OpenBytes<'_>,
 ) -> anyhow::Result<()> {
     let visit = |visitor: &mut dyn FnMut(&SceneState) -> anyhow::Result<ControlFlow<()>>| {
         let bar = progress_bar(steps.len() as u64);
@@ -190,11 +215,7 @@ fn export<R: Read>(
         visited.with_context(|| output::path_text(&args.file))?;
         refused.map_or(Ok(()), Err)
     };
-    let open_bytes = || {
-        let file = open_regular_file(&args.file)?.take(survey.intact_count);
-        Ok(Box::new(BufReader::with_capacity(BUFFER_SIZE_BYTES, file)) as Box<dyn Read>)
-    };
-    let snapshots = survey.snapshots(steps, &visit, &open_bytes);
+    let snapshots = survey.snapshots(steps, &visit, open_bytes);
     let existing = args.overwrite.existing();
     match *format {
         Format::Pictures(format, folder) => {

@@ -8,12 +8,15 @@ mod survey;
 mod timing;
 
 use std::fs;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use recorder::pictures::encode_svg;
-use recorder::{LogEnd, LogReader, Message, PartFile};
+use recorder::{IntactParts, LogEnd, LogReader, Message, PartFile, ReadError};
+use sim_contract::Stop;
 
+use crate::cli::damaged_input::intact_parts;
 use crate::cli::exit::Exit;
 use crate::cli::file_args::OverwriteArgs;
 use crate::cli::output::{self, AsJson};
@@ -25,7 +28,7 @@ use timing::{Timing, period_ns};
 
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Lateness and solver times are those of the recorded steps. A step counts as late if it \
+    after_help = "Of a damaged recording, shows what `recorder repair` would save. Lateness and solver times are those of the recorded steps. A step counts as late if it \
     woke up more than a period of the scene's rate after its deadline.\n\n\
     Exit codes: 0 complete; 1 not a recording, no measured times, or OUT.svg exists; 3 messages lost, or file truncated \
     or damaged.\n\nExamples:\n  \
@@ -53,16 +56,28 @@ pub(crate) fn run(args: &InfoArgs) -> anyhow::Result<Exit> {
         check_output(args, svg)?;
     }
     let path = output::path_text(&args.file);
-    let mut log = LogReader::open(&args.file).with_context(|| path.clone())?;
+    let stop = Stop::install()?;
+    let open = || LogReader::open_until(&args.file, &stop);
     let size_bytes = fs::metadata(&args.file).with_context(|| path.clone())?.len();
-    let (info, end) = inspect(&mut log, path.clone(), size_bytes).with_context(|| path.clone())?;
-    if args.timing {
-        print_timing(args, &info).with_context(|| path.clone())?;
-    } else {
-        output::result(args.as_json, &info, &info.to_string())?;
-    }
+    let inspected = open().map_err(anyhow::Error::from);
+    let inspected = inspected.and_then(|mut log| inspect(&mut log, path.clone(), size_bytes));
+    let (mut info, end) = inspected.with_context(|| path.clone())?;
+    let saves_more = |parts: &IntactParts| parts.snapshot_count() > info.snapshot_count;
+    let parts = intact_parts(&args.file, &end, &stop, saves_more)?;
+    let done = match &parts {
+        None => {
+            print(args, &info, open).with_context(|| path.clone())?;
+            "read as far as it goes"
+        }
+        Some(parts) => {
+            info = inspect(&mut parts.reader()?, path.clone(), size_bytes)?.0;
+            info.file_end = end.to_string();
+            print(args, &info, || parts.reader()).with_context(|| path.clone())?;
+            "read what is intact"
+        }
+    };
     if end != LogEnd::Complete {
-        output::warn_incomplete(&args.file, &end, "read as far as it goes");
+        output::warn_incomplete(&args.file, &end, done);
     }
     Ok(if end == LogEnd::Complete && info.lost.is_empty() { Exit::Done } else { Exit::Loss })
 }
@@ -76,8 +91,15 @@ fn check_output(args: &InfoArgs, svg: &Path) -> anyhow::Result<()> {
     Ok(args.overwrite.existing().check(svg)?)
 }
 
-/// Prints the measured times, and draws them if asked to.
-fn print_timing(args: &InfoArgs, info: &Info) -> anyhow::Result<()> {
+/// Prints the report, or the measured times, and draws these if asked to.
+fn print<R: Read>(
+    args: &InfoArgs,
+    info: &Info,
+    open: impl FnOnce() -> Result<LogReader<R>, ReadError>,
+) -> anyhow::Result<()> {
+    if !args.timing {
+        return output::result(args.as_json, info, &info.to_string());
+    }
     let Some(timing) = &info.timing else {
         bail!(
             "has no measured times ({}); `recorder record` records those of a running node",
@@ -85,15 +107,15 @@ fn print_timing(args: &InfoArgs, info: &Info) -> anyhow::Result<()> {
         );
     };
     if let Some(svg) = &args.svg {
-        let graph = graph(args, info, timing)?;
+        let graph = graph(open()?, info, timing)?;
         PartFile::write_whole(svg, args.overwrite.existing(), graph.as_bytes())?;
     }
     output::result(args.as_json, timing, &timing.to_string())
 }
 
 /// Reads the recording again, and returns the graph of its times as SVG.
-fn graph(args: &InfoArgs, info: &Info, timing: &Timing) -> anyhow::Result<String> {
-    let [wake_late, solve] = columns(&args.file, timing)?;
+fn graph<R: Read>(log: LogReader<R>, info: &Info, timing: &Timing) -> anyhow::Result<String> {
+    let [wake_late, solve] = columns(log, timing)?;
     let graph = Graph {
         title: format!("{}: {}, {} Hz", info.file_name(), info.scene, info.rate_hz),
         steps: timing.steps,
@@ -105,10 +127,9 @@ fn graph(args: &InfoArgs, info: &Info, timing: &Timing) -> anyhow::Result<String
 }
 
 /// Returns the columns of the wake-up lateness and of the solver time.
-fn columns(file: &Path, timing: &Timing) -> anyhow::Result<[Columns; 2]> {
+fn columns<R: Read>(mut log: LogReader<R>, timing: &Timing) -> anyhow::Result<[Columns; 2]> {
     let measured_count = usize::try_from(timing.measured_steps).unwrap_or(usize::MAX);
     let mut collector = ColumnCollector::new(timing.steps, measured_count.min(COLUMNS_MAX))?;
-    let mut log = LogReader::open(file)?;
     while let Some(logged) = log.next_message()? {
         if let Message::Step(row) = &logged.message {
             collector.add(row);

@@ -7,12 +7,11 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use recorder::{
-    AfterEnd, Finding, LoadRows, PartFile, ReadError, RepairReport, SCENE_ATTACHMENT, SurfaceRow,
-    Topic, TopologyRow, bend_state, constraint_state, counted, open_regular_file, repair_file,
+    AfterEnd, Finding, LoadRows, PartFile, ReadError, RepairReport, Topic, counted, load_rows,
+    open_regular_file, repair_file,
 };
 use serde::Serialize;
-use sim_contract::{LoadHeader, Stop, Triangle, is_being_written, printable_line};
-use sim_solver::{Scene, Solver};
+use sim_contract::{Stop, is_being_written, printable_line};
 
 use crate::cli::exit::Exit;
 use crate::cli::file_args::{OverwriteArgs, refuse_own_input};
@@ -84,7 +83,7 @@ pub(crate) fn run(args: &RepairArgs) -> anyhow::Result<Exit> {
         ));
     }
     let (mut file, mut report) = copy(args, open()?, None, &stop)?;
-    let load = lost_load(&report);
+    let load = load_rows(&report);
     let mut restored: &[_] = &[];
     if load.is_some() {
         // It comes before everything that was written.
@@ -119,32 +118,6 @@ fn copy(
             Err(error).with_context(|| output::path_text(&args.input))
         }
     }
-}
-
-/// Returns the load that a repair could not copy, from the scene. `None` if the file has it, or if the
-/// scene is not intact.
-fn lost_load(report: &RepairReport) -> Option<LoadRows> {
-    let lost = report.lost_load.as_ref()?;
-    let text = std::str::from_utf8(report.scene.as_ref()?).ok()?;
-    let scene = Scene::from_toml(text, SCENE_ATTACHMENT).ok()?;
-    let solver = Solver::new(&scene);
-    let header = LoadHeader {
-        // The first load begins at step 0. Only its own row tells the step of a later one.
-        step: if lost.revision == 0 { 0 } else { lost.step },
-        topology_revision: lost.revision,
-        method: scene.solver.method as u32,
-        ..LoadHeader::default()
-    };
-    let constraints: Vec<_> = solver.constraints().map(constraint_state).collect();
-    let triangles: Vec<_> =
-        solver.triangles().iter().map(|corners| Triangle { corners: *corners }).collect();
-    let bends = solver.bends().filter(|_| lost.has_bends);
-    let bends: Vec<_> = bends.map(bend_state).collect();
-    let topology = TopologyRow::new(&header, &constraints, &bends);
-    Some(LoadRows {
-        topology: TopologyRow { torn: lost.torn.clone(), ..topology },
-        surface: SurfaceRow::new(&header, &triangles),
-    })
 }
 
 impl<'a> Repaired<'a> {

@@ -8,10 +8,10 @@ use anyhow::{Context, bail};
 use recorder::verification::{
     StepRange, Verdict, VerifyError, VerifyOptions, VerifyReport, verify,
 };
-use recorder::{LogReader, Wanted, find_state};
+use recorder::{IntactParts, LogEnd, LogReader, ReadError, Wanted, find_state};
 use sim_contract::{Stop, printable_line};
 
-use crate::cli::damaged_input::{lacks, lacks_state};
+use crate::cli::damaged_input::{DamagedInput, intact_parts, lacks, lacks_state};
 use crate::cli::exit::Exit;
 use crate::cli::output::{self, AsJson};
 use crate::cli::parse::whole_number;
@@ -22,7 +22,7 @@ use crate::cli::thread_args::ThreadArgs;
 #[command(
     after_help = "Compares everything that a recorder writes, also where the checksums are gone, \
     and lists the messages that are missing. --verbose also lists the content that is not compared, because \
-    nothing else in the file can contradict it. Behind missing outcomes, it goes on from the next complete state.\n\n\
+    nothing else in the file can contradict it. Of a damaged recording, compares what `recorder repair` would save. Behind missing outcomes, it goes on from the next complete state.\n\n\
     Exit codes: 0 every recorded step is bit-identical; 1 not verifiable; 3 different, outcomes missing, or file truncated \
     or damaged.\n\nExamples:\n  \
     recorder verify run.mcap\n  \
@@ -50,26 +50,36 @@ pub(crate) struct VerifyArgs {
 pub(crate) fn run(args: &VerifyArgs) -> anyhow::Result<Exit> {
     let stop = Stop::install()?;
     let path = output::path_text(&args.file);
-    let open = || LogReader::open_until(&args.file, &stop).with_context(|| path.clone());
-    let range = args.range(open)?;
-    let size_bytes = std::fs::metadata(&args.file).map_or(0, |file| file.len());
-    let bar = progress_bytes(size_bytes);
-    let options = VerifyOptions { threads: args.threads.count(), range };
-    let report = verify(open()?, options, stop.flag(), |bytes| bar.set_position(bytes));
-    let report =
-        report.map_err(|error| explain(error, &args.file)).with_context(|| path.clone())?;
-    bar.finish_and_clear();
+    let mut report = args.verify(|| LogReader::open_until(&args.file, &stop), &stop);
+    let mut done = "verified as far as it goes";
+    if let Some((end, last_step)) = readable_part(&report) {
+        let saves_more = |parts: &IntactParts| parts.last_step() > last_step;
+        if let Some(parts) = intact_parts(&args.file, &end, &stop, saves_more)? {
+            report = args.verify(|| parts.reader(), &stop);
+            report = report.map(|report| VerifyReport { end: Some(end), ..report });
+            done = "verified what is intact";
+        }
+    }
+    let report = report.with_context(|| path.clone())?;
     args.check_range(&report).with_context(|| path.clone())?;
     output::result(args.as_json, &report, &args.text(&report))?;
     let end = report.incomplete_end();
     if let Some(end) = end {
-        output::warn_incomplete(&args.file, end, "verified as far as it goes");
+        output::warn_incomplete(&args.file, end, done);
     }
     Ok(match report.verdict {
         Verdict::Interrupted => Exit::Failed,
         Verdict::Identical if end.is_none() => Exit::Done,
         _ => Exit::Loss,
     })
+}
+
+/// Returns the end of the readable part of a file that is not complete, and the last step that was compared.
+fn readable_part(report: &anyhow::Result<VerifyReport>) -> Option<(LogEnd, Option<u64>)> {
+    match report {
+        Ok(report) => Some((report.incomplete_end()?.clone(), report.last_identical_step)),
+        Err(error) => Some((error.downcast_ref::<DamagedInput>()?.end().clone(), None)),
+    }
 }
 
 /// Adds the cause to the error of a damaged file.
@@ -81,6 +91,19 @@ fn explain(error: VerifyError, path: &Path) -> anyhow::Error {
 }
 
 impl VerifyArgs {
+    fn verify<R: Read + Send>(
+        &self,
+        open: impl Fn() -> Result<LogReader<R>, ReadError>,
+        stop: &Stop,
+    ) -> anyhow::Result<VerifyReport> {
+        let range = self.range(open()?)?;
+        let bar = progress_bytes(std::fs::metadata(&self.file).map_or(0, |file| file.len()));
+        let options = VerifyOptions { threads: self.threads.count(), range };
+        let report = verify(open()?, options, stop.flag(), |bytes| bar.set_position(bytes));
+        bar.finish_and_clear();
+        report.map_err(|error| explain(error, &self.file))
+    }
+
     /// Refuses a range that begins after the last step: nothing of it was compared.
     fn check_range(&self, report: &VerifyReport) -> anyhow::Result<()> {
         match (self.from, report.last_identical_step) {
@@ -92,18 +115,14 @@ impl VerifyArgs {
     }
 
     /// Returns the steps to compare, with the one to start from.
-    fn range<R: Read>(
-        &self,
-        open: impl FnOnce() -> anyhow::Result<LogReader<R>>,
-    ) -> anyhow::Result<StepRange> {
+    fn range<R: Read>(&self, log: LogReader<R>) -> anyhow::Result<StepRange> {
         let last = self.to.unwrap_or(u64::MAX);
         let Some(from) = self.from else { return Ok(StepRange { start: 0, last }) };
         if from > last {
             bail!("--from {from} is after --to {last}");
         }
-        let place = find_state(open()?, Wanted::UpTo(from));
-        let place = place.map_err(|error| lacks_state(&self.file, error));
-        let place = place.with_context(|| output::path_text(&self.file))?;
+        let place = find_state(log, Wanted::UpTo(from));
+        let place = place.map_err(|error| lacks_state(&self.file, error))?;
         Ok(StepRange { start: place.keyframe_step, last })
     }
 

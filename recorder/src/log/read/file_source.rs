@@ -2,7 +2,7 @@
 
 use std::fmt;
 use std::fs::File;
-use std::io::{self, BufReader, Read};
+use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::os::unix::fs::FileExt;
 use std::sync::Arc;
 
@@ -21,9 +21,16 @@ pub struct FileSource {
 
 /// A file that several readers share, each with a position of its own.
 #[derive(Debug)]
-struct SharedFile {
+pub struct SharedFile {
     file: Arc<File>,
     position: u64,
+}
+
+impl SharedFile {
+    /// Begins at the start of the file.
+    pub fn new(file: Arc<File>) -> Self {
+        Self { file, position: 0 }
+    }
 }
 
 impl Read for SharedFile {
@@ -31,6 +38,18 @@ impl Read for SharedFile {
         let count = self.file.read_at(buffer, self.position)?;
         self.position += count as u64;
         Ok(count)
+    }
+}
+
+impl Seek for SharedFile {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        let position = match to {
+            SeekFrom::Start(position) => Some(position),
+            SeekFrom::Current(offset) => self.position.checked_add_signed(offset),
+            SeekFrom::End(offset) => self.file.metadata()?.len().checked_add_signed(offset),
+        };
+        self.position = position.ok_or(io::ErrorKind::InvalidInput)?;
+        Ok(self.position)
     }
 }
 
@@ -48,8 +67,7 @@ impl std::error::Error for Interrupted {}
 
 impl FileSource {
     pub(super) fn new(file: Arc<File>, stop: Option<Stop>) -> Self {
-        let file = SharedFile { file, position: 0 };
-        Self { file: BufReader::with_capacity(BUFFER_SIZE_BYTES, file), stop }
+        Self { file: BufReader::with_capacity(BUFFER_SIZE_BYTES, SharedFile::new(file)), stop }
     }
 
     /// Continues at a byte of the file.
