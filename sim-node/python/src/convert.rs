@@ -3,7 +3,8 @@
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::PyBool;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::{PyBool, PyType};
 use serde::Serialize;
 use sim_contract::{ParameterValue, ParticleState};
 
@@ -64,6 +65,17 @@ pub(crate) fn parameter_value(value: &Bound<'_, PyAny>) -> PyResult<ParameterVal
     }
     let message = format!("expected a number, 3 numbers or None (off), got {}", shown(value));
     Err(PyTypeError::new_err(message))
+}
+
+/// Returns a hash as `numpy.uint64`: arrays, and the `info` of Gymnasium, would not keep all bits of an `int`.
+pub(crate) fn hash(py: Python<'_>, hash: u64) -> PyResult<Bound<'_, PyAny>> {
+    static UINT64: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+    UINT64.import(py, "numpy", "uint64")?.call1((hash,))
+}
+
+/// Returns a hash as recordings and `sim-node ctl hash` write it.
+pub(crate) fn hash_hex(hash: u64) -> String {
+    format!("{hash:016x}")
 }
 
 /// Returns the Python form of a value that recordings store as JSON: dicts, lists and plain values.

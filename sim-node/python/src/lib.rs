@@ -12,6 +12,7 @@ mod error;
 mod lockstep;
 mod node;
 mod patience;
+mod picture;
 mod process;
 mod recording;
 mod simulation;

@@ -6,15 +6,18 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use pyo3::prelude::*;
-use sim_contract::{Client, LockstepError, OwnerState};
+use sim_contract::{Client, GivenState, LockstepError, OwnerState, RequestError, SentState};
 
 use crate::arguments;
+use crate::convert::motion;
 use crate::data::action::Action;
+use crate::data::forces::Forces;
 use crate::data::outcome::Outcome;
 use crate::data::snapshot::Snapshot;
 use crate::error::{Error, lockstep_error, read_error, request_error};
 use crate::node::Node;
 use crate::patience::Patience;
+use crate::process::OfProcess;
 
 #[pyclass(frozen, subclass, module = "catenary")]
 #[derive(Debug)]
@@ -29,12 +32,22 @@ pub(crate) struct Lockstep {
 #[derive(Debug, Default)]
 struct Progress {
     is_member: bool,
+    /// A turn has begun since the joining.
+    has_begun: bool,
     /// Turns that the node has computed without this member, up to the last turn.
     missed_turns: u64,
-    /// Sequence numbers of sent commands without an outcome.
-    sent: Vec<u64>,
+    /// Sent commands without an outcome.
+    sent: Vec<Sent>,
     /// Outcomes that have arrived with the last turn.
     outcomes: Vec<sim_contract::Outcome>,
+}
+
+/// A sent command.
+#[derive(Debug)]
+struct Sent {
+    sequence: u64,
+    /// The state that it gives. The message vanishes with it, so it lives until the outcome arrives.
+    _state: Option<OfProcess<SentState>>,
 }
 
 impl Lockstep {
@@ -47,6 +60,35 @@ impl Lockstep {
             return Ok(());
         }
         Err(Error::new_err("not in the lockstep: use `with node.lockstep() as steps:`"))
+    }
+
+    /// Sends a command for the next step. Before the first turn, it waits for that turn, so that the first snapshot of
+    /// the program shows the effect.
+    fn send_in_turn(
+        &self,
+        py: Python<'_>,
+        send: impl FnOnce(&mut Client) -> Result<(u64, Option<SentState>), RequestError> + Send,
+    ) -> PyResult<u64> {
+        self.require_member()?;
+        let node = self.node.get();
+        if !self.progress().has_begun {
+            let turn = node.read(py, Patience::new(Some(self.timeout_s))?, |client, part| {
+                client.next_turn(part).map_err(|error| lockstep_error(&error))
+            })?;
+            turn.ok_or_else(|| node.silence(py).unwrap_or_else(|error| error))?;
+            self.progress().has_begun = true;
+        }
+        let (sequence, state) =
+            node.call(py, |client| send(client).map_err(|error| request_error(&error)))?;
+        let state = state.map(|state| OfProcess::new("state", state));
+        self.progress().sent.push(Sent { sequence, _state: state });
+        Ok(sequence)
+    }
+
+    fn give(&self, py: Python<'_>, state: &GivenState<'_>) -> PyResult<u64> {
+        self.send_in_turn(py, |client| {
+            client.send_state(state).map(|sent| (sent.sequence(), Some(sent)))
+        })
     }
 
     /// Joins the lockstep, and waits for the admission.
@@ -95,16 +137,16 @@ fn with_timeout(error: LockstepError, timeout_s: f64) -> LockstepError {
     }
 }
 
-/// Returns the outcomes that have arrived, and the sequence numbers without one.
+/// Returns the outcomes that have arrived, and the commands without one.
 fn arrived(
     client: &mut Client,
-    sent: Vec<u64>,
-) -> PyResult<(Vec<sim_contract::Outcome>, Vec<u64>)> {
+    sent: Vec<Sent>,
+) -> PyResult<(Vec<sim_contract::Outcome>, Vec<Sent>)> {
     let (mut outcomes, mut unanswered) = (Vec::new(), Vec::new());
-    for sequence in sent {
-        match client.arrived_outcome(sequence).map_err(|error| read_error(&error))? {
+    for command in sent {
+        match client.arrived_outcome(command.sequence).map_err(|error| read_error(&error))? {
             Some(outcome) => outcomes.push(outcome),
-            None => unanswered.push(sequence),
+            None => unanswered.push(command),
         }
     }
     Ok((outcomes, unanswered))
@@ -163,8 +205,8 @@ impl Lockstep {
             return Ok(());
         }
         // The commands of the last turn. A node that ends does not answer them.
-        for sequence in sent {
-            match node.outcome(py, sequence, Some(self.timeout_s)) {
+        for command in sent {
+            match node.outcome(py, command.sequence, Some(self.timeout_s)) {
                 Ok(outcome) => _ = outcome.require_applied(py)?,
                 Err(_) => break,
             }
@@ -191,6 +233,7 @@ impl Lockstep {
         let (outcomes, sent) = node.call(py, |client| arrived(client, sent))?;
         {
             let mut progress = self.progress();
+            progress.has_begun = true;
             (progress.outcomes, progress.sent) = (outcomes.clone(), sent);
         }
         let snapshot = node.show(py, snapshot)?;
@@ -209,12 +252,32 @@ impl Lockstep {
 
     /// Sends an action for the next step. Returns its sequence number.
     fn send(&self, py: Python<'_>, action: &Action) -> PyResult<u64> {
-        self.require_member()?;
         let action = action.0;
-        let node = self.node.get();
-        let sequence =
-            node.call(py, |client| client.send(action).map_err(|error| request_error(&error)))?;
-        self.progress().sent.push(sequence);
-        Ok(sequence)
+        self.send_in_turn(py, |client| client.send(action).map(|sequence| (sequence, None)))
+    }
+
+    /// Puts a state in place in the next step, which shows it without further changes. Returns the sequence number.
+    ///
+    /// A `State` replaces everything. A `Snapshot` replaces only positions and velocities.
+    fn restore(&self, py: Python<'_>, state: &Bound<'_, PyAny>) -> PyResult<u64> {
+        self.node.get().with_given(py, state, |given| self.give(py, given))
+    }
+
+    /// Replaces the positions and velocities of all particles in the next step. Shape of both: (particles, 3).
+    fn set_motion(
+        &self,
+        py: Python<'_>,
+        positions: &Bound<'_, PyAny>,
+        velocities: &Bound<'_, PyAny>,
+    ) -> PyResult<u64> {
+        let particles = motion(positions, velocities)?;
+        self.node.get().with_motion(py, &particles, |given| self.give(py, given))
+    }
+
+    /// Returns the forces of the step of the last snapshot. None if the node has not computed them: the first call makes
+    /// it compute them from the next step on.
+    fn forces(&self, py: Python<'_>) -> PyResult<Option<Forces>> {
+        self.require_member()?;
+        self.node.get().newest_forces(py)
     }
 }

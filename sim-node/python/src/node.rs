@@ -2,11 +2,11 @@
 
 mod restoring;
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use numpy::{PyArray1, PyArray2};
-use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use recorder::{CollidersRow, StatusRow};
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
@@ -36,7 +36,7 @@ pub(crate) struct Node {
     pub(crate) endpoint: Endpoint,
     client: OfProcess<Client>,
     /// Each snapshot comes with its forces.
-    reads_forces: bool,
+    reads_forces: AtomicBool,
     /// The newest snapshot that was read, which `latest` returns again until there is a newer one.
     newest: Mutex<Option<Py<Snapshot>>>,
 }
@@ -113,7 +113,7 @@ impl Node {
     }
 
     /// Reads what the node has published once.
-    fn latched<T: Send>(
+    pub(crate) fn latched<T: Send>(
         &self,
         py: Python<'_>,
         mut read: impl FnMut(&mut Client, Duration) -> Result<Option<T>, ReadError> + Send,
@@ -174,7 +174,7 @@ impl Node {
 
     /// Returns the forces of the step of a snapshot, which the node has published before it.
     fn forces_of(&self, py: Python<'_>, header: &SnapshotHeader) -> PyResult<ForcesSource> {
-        if !self.reads_forces {
+        if !self.reads_forces.load(Ordering::Relaxed) {
             return Ok(ForcesSource::Unread("attach with `catenary.attach(..., forces=True)`"));
         }
         let read = |client: &mut Client| client.forces_of(header, Duration::ZERO);
@@ -193,11 +193,28 @@ impl Node {
     ) -> PyResult<Self> {
         let client = attach(py, &endpoint, client_id, timeout)?;
         let client = OfProcess::new("node", client);
-        let node = Self { endpoint, client, reads_forces, newest: Mutex::default() };
+        let (reads_none, newest) = (AtomicBool::new(false), Mutex::default());
+        let node = Self { endpoint, client, reads_forces: reads_none, newest };
         if reads_forces {
-            node.call(py, |client| client.forces(Duration::ZERO).map_err(|e| read_error(&e)))?;
+            node.begin_forces(py)?;
         }
         Ok(node)
+    }
+
+    /// Lets each snapshot come with its forces, which the node computes from its next step on.
+    fn begin_forces(&self, py: Python<'_>) -> PyResult<()> {
+        self.call(py, |client| client.forces(Duration::ZERO).map_err(|e| read_error(&e)))?;
+        self.reads_forces.store(true, Ordering::Relaxed);
+        Ok(())
+    }
+
+    /// Returns the forces of the step of the newest snapshot that was read. `None` if they were not computed.
+    pub(crate) fn newest_forces(&self, py: Python<'_>) -> PyResult<Option<Forces>> {
+        if !self.reads_forces.load(Ordering::Relaxed) {
+            self.begin_forces(py)?;
+        }
+        let newest = self.newest().as_ref().map(|snapshot| snapshot.clone_ref(py));
+        newest.map_or(Ok(None), |snapshot| snapshot.get().forces_read(py))
     }
 }
 
@@ -221,7 +238,8 @@ impl Node {
 
     /// Returns another connection to the same node, with an id and a queue of snapshots of its own.
     fn another(&self, py: Python<'_>) -> PyResult<Self> {
-        Self::connect(py, self.endpoint.clone(), None, 0.0, self.reads_forces)
+        let reads_forces = self.reads_forces.load(Ordering::Relaxed);
+        Self::connect(py, self.endpoint.clone(), None, 0.0, reads_forces)
     }
 
     /// Id of this client in outcomes and recordings.
@@ -428,13 +446,7 @@ impl Node {
     #[pyo3(signature = (state, timeout=5.0))]
     fn restore(&self, py: Python<'_>, state: &Bound<'_, PyAny>, timeout: f64) -> PyResult<Outcome> {
         Patience::new(Some(timeout))?;
-        if let Ok(state) = state.cast::<State>() {
-            self.give(py, &state.get().given(), timeout)
-        } else if let Ok(snapshot) = state.cast::<Snapshot>() {
-            self.give_motion(py, &snapshot.get().to_vec()?, timeout)
-        } else {
-            Err(PyTypeError::new_err("expected a State or a Snapshot"))
-        }
+        self.with_given(py, state, |given| self.give(py, given, timeout))
     }
 
     /// Replaces the positions and velocities of all particles. Shape of both: (particles, 3).
@@ -447,7 +459,8 @@ impl Node {
         timeout: f64,
     ) -> PyResult<Outcome> {
         Patience::new(Some(timeout))?;
-        self.give_motion(py, &motion(positions, velocities)?, timeout)
+        let particles = motion(positions, velocities)?;
+        self.with_motion(py, &particles, |given| self.give(py, given, timeout))
     }
 
     /// Returns the newest complete state, which `restore` puts in place again.

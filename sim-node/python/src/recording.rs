@@ -2,17 +2,18 @@
 
 use std::error::Error as StdError;
 use std::path::PathBuf;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
-use numpy::{PyArray1, PyArray2};
+use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use recorder::{
-    LogReader, Message, ReadError, RunDescription, StepRow, Tape, TapeError, TapeState,
-    complete_state,
+    LogReader, Message, ReadError, RunDescription, SceneState, SceneStateError, StepRow, Tape,
+    TapeError, TapeState, complete_state,
 };
 use sim_contract::SnapshotHeader;
+use sim_solver::Scene;
 
 use crate::arguments;
 use crate::convert::from_json;
@@ -22,6 +23,7 @@ use crate::data::snapshot::{ForcesSource, Snapshot};
 use crate::data::state::State;
 use crate::error::{Error, RecordingError, recording_error};
 use crate::patience::run_until_signal;
+use crate::picture::{Caption, Corners, PictureRequest, PixelSize};
 
 #[pyclass(frozen, subclass, module = "catenary")]
 #[derive(Debug)]
@@ -29,6 +31,8 @@ pub(crate) struct Recording {
     path: PathBuf,
     /// `None` once it is closed.
     tape: Mutex<Option<Tape>>,
+    /// The scene, once it is needed. `None` if it cannot be read.
+    scene: OnceLock<Option<Scene>>,
 }
 
 impl Recording {
@@ -87,6 +91,15 @@ impl Recording {
         Err(PyKeyError::new_err(message))
     }
 
+    /// Returns the scene of the recording, if it can be read.
+    fn parsed_scene(&self, tape: &Tape) -> Option<&Scene> {
+        let parse = || {
+            let text = std::str::from_utf8(tape.log().scene()).ok()?;
+            Scene::from_toml(text, "scene.toml").ok()
+        };
+        self.scene.get_or_init(parse).as_ref()
+    }
+
     fn malformed(&self, topic: &str) -> PyErr {
         RecordingError::new_err(format!("{}: {topic} is malformed", self.path()))
     }
@@ -121,7 +134,7 @@ impl Recording {
         // Without an index, the whole file is scanned.
         let tape = run_until_signal(py, |stop| Tape::open(&path, Some(stop), &mut |_, _| ()))?;
         let tape = tape.map_err(|error| recording_error(&path, &error))?;
-        Ok(Self { path, tape: Mutex::new(Some(tape)) })
+        Ok(Self { path, tape: Mutex::new(Some(tape)), scene: OnceLock::new() })
     }
 
     /// Path of the file.
@@ -202,7 +215,7 @@ impl Recording {
     ) -> PyResult<Snapshot> {
         let (header, particles) = this.get().read(py, |tape| {
             let state = tape.state_at(step)?;
-            Ok::<_, TapeError>((header(tape.run(), &state), state.particles.to_vec()))
+            Ok::<_, TapeError>((header(tape.run(), &state), state.particles))
         })?;
         Ok(Snapshot::own(header, particles, ForcesSource::Recorded(this.clone().unbind())))
     }
@@ -255,6 +268,44 @@ impl Recording {
             ))
         })?;
         Forces::new(py, &row, self.rate()?)
+    }
+
+    /// Returns a picture of a recorded step as `recorder export --png` draws it, from the top to the bottom: red,
+    /// green and blue. Shape: (height, width, 3).
+    ///
+    /// `size` is width and height in pixels. `view` is "front", "side", "top" or "iso"; by default it suits the scene.
+    /// The style "wires" shows particles, constraints and triangles, and "shaded" smooth surfaces. `bounds` are two
+    /// corners of the box that the picture shows, by default around the state: give them to keep the camera still.
+    ///
+    /// Raises `KeyError` for a step that was not recorded.
+    #[pyo3(signature = (step, *, size=(960, 720), view=None, style="wires", bounds=None))]
+    #[allow(clippy::too_many_arguments, reason = "these are the keywords of Python")]
+    fn render<'py>(
+        &self,
+        py: Python<'py>,
+        #[pyo3(from_py_with = arguments::step)] step: u64,
+        size: PixelSize,
+        view: Option<&str>,
+        style: &str,
+        bounds: Option<Corners>,
+    ) -> PyResult<Bound<'py, PyArray3<u8>>> {
+        let request = PictureRequest::new(size, view, style, bounds)?;
+        let (state, caption) = self.read(py, |tape| {
+            let scene = self.parsed_scene(tape);
+            let state = SceneState::of_tape(tape, step, scene)?;
+            let run = tape.run();
+            let passed = state.row.step.saturating_sub(tape.first_step());
+            let time_s = passed as f64 / f64::from(run.rate_hz);
+            let up = scene.map_or(run.up, |scene| scene.up);
+            let caption = Caption { scene_name: run.scene_name.clone(), up, time_s };
+            Ok::<_, SceneStateError>((state, caption))
+        })?;
+        if state.row.step != step {
+            self.require_step(step)?;
+            return Err(PyKeyError::new_err(format!("{} has no step {step}", self.path())));
+        }
+        let scene = self.scene.get().and_then(Option::as_ref);
+        request.draw(py, &state, scene, caption)
     }
 
     /// Returns a table of all recorded steps, by column: `pandas.DataFrame(recording.steps())`.

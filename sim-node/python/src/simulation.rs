@@ -1,19 +1,22 @@
 //! The solver in this process, without a node or shared memory.
 
-use std::path::PathBuf;
-use std::sync::{Mutex, PoisonError};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
 
-use numpy::{PyArray1, PyArray2};
+use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
-use recorder::simulation::{colliders_row, forces_row};
-use recorder::{RunDescription, bend_state, constraint_state};
+use pyo3::types::{PyDict, PyTuple};
+use recorder::simulation::{SteppedRecording, apply, colliders_row, forces_row};
+use recorder::{Existing, RunDescription, SceneState, bend_state, constraint_state};
 use sim_contract::clock::monotonic_ns;
-use sim_contract::{LoadHeader, ParticleState, SnapshotHeader, Triangle, scene_hash};
-use sim_solver::{Applied, Control, Reason, SOLVER_VERSION, Scene, Solver};
+use sim_contract::{
+    LoadHeader, ParticleState, RestoreContents, SnapshotHeader, Triangle, scene_hash,
+};
+use sim_solver::{Applied, Reason, RestoreError, SOLVER_VERSION, Scene, Solver};
 
 use crate::arguments;
-use crate::convert::{from_json, motion};
+use crate::convert::{from_json, hash, hash_hex, motion};
 use crate::data::action::Action;
 use crate::data::forces::Forces;
 use crate::data::outcome::{cause, indices, rejected};
@@ -21,12 +24,13 @@ use crate::data::scene::{Bends, Topology, corners, load_scene, scene_error};
 use crate::data::snapshot::{ForcesSource, POSITION, Snapshot, VELOCITY};
 use crate::data::state::State;
 use crate::data::view;
-use crate::error::{Error, StateError};
+use crate::error::{Error, StateError, recording_error};
 use crate::patience::PART;
+use crate::picture::{Caption, Corners, PictureRequest, PixelSize};
 use crate::process::OfProcess;
 
-/// The client id of every action.
-const CLIENT_ID: u64 = 1;
+/// The client id of every action: that of a command in a file without one.
+const CLIENT_ID: u64 = 0;
 
 const WITH_FORCES: &str = "make the simulation with `Simulation(..., forces=True)`";
 
@@ -35,24 +39,26 @@ const WITH_FORCES: &str = "make the simulation with `Simulation(..., forces=True
 pub(crate) struct Simulation {
     scene: Scene,
     scene_hash: u64,
+    threads: usize,
+    has_forces: bool,
     running: SharedRunning,
 }
 
-/// The running state. Worker threads do not survive a fork, so a state with several threads belongs to its
-/// process.
+/// The running state. Worker threads do not survive a fork, and two processes must not write the same file, so a
+/// state with one of them belongs to its process.
 #[derive(Debug)]
 enum SharedRunning {
-    OneThread(Mutex<Running>),
-    Threads(OfProcess<Running>),
+    Alone(Mutex<Running>),
+    OfProcess(OfProcess<Running>),
 }
 
 impl SharedRunning {
     fn with<R>(&self, call: impl FnOnce(&mut Running) -> PyResult<R>) -> PyResult<R> {
         match self {
-            Self::OneThread(running) => {
+            Self::Alone(running) => {
                 call(&mut running.lock().unwrap_or_else(PoisonError::into_inner))
             }
-            Self::Threads(running) => running.with(call),
+            Self::OfProcess(running) => running.with(call),
         }
     }
 }
@@ -63,23 +69,91 @@ struct Running {
     step: u64,
     /// Commands have changed what the next step will do.
     is_changed: bool,
+    /// Copy of the particles, once a program has asked for them after the last change.
+    particles: Option<Arc<Vec<ParticleState>>>,
+    recording: Option<Recorded>,
+}
+
+/// The recording of the steps, and its path for errors.
+#[derive(Debug)]
+struct Recorded {
+    path: PathBuf,
+    file: SteppedRecording,
 }
 
 impl Running {
     /// Makes steps for as long as a look at signals can wait. Returns the number of steps that are left.
-    fn advance(&mut self, count: u64) -> u64 {
+    fn advance(&mut self, count: u64) -> PyResult<u64> {
         let start_ns = monotonic_ns();
         let mut left = count;
         while left > 0 {
-            self.solver.step();
-            self.step += 1;
-            self.is_changed = false;
+            self.make_step()?;
             left -= 1;
             if left > 0 && u128::from(monotonic_ns() - start_ns) > PART.as_nanos() {
                 break;
             }
         }
-        left
+        Ok(left)
+    }
+
+    /// Makes a step and records it. After an error of writing, the simulation goes on unrecorded.
+    fn make_step(&mut self) -> PyResult<()> {
+        self.solver.step();
+        self.step += 1;
+        (self.is_changed, self.particles) = (false, None);
+        let Some(recording) = &mut self.recording else { return Ok(()) };
+        let Err(error) = recording.file.write_step(&self.solver, self.step) else { return Ok(()) };
+        let error = recording_error(&recording.path, &error);
+        self.recording = None;
+        Err(error)
+    }
+
+    /// Applies an action before the next step, and records its outcome.
+    fn apply(&mut self, action: sim_contract::Action) -> Result<(), Reason> {
+        let result = apply(&mut self.solver, CLIENT_ID, &action);
+        self.note(action, result);
+        result.map(|_| ())
+    }
+
+    /// Records the outcome of a command that changes the next step.
+    fn note(&mut self, action: sim_contract::Action, result: Result<Applied, Reason>) {
+        (self.is_changed, self.particles) = (true, None);
+        if let Some(recording) = &mut self.recording {
+            recording.file.add_command(self.step + 1, action, result);
+        }
+    }
+
+    /// Puts a state in place, and makes the step that shows it.
+    fn put_in_place(
+        &mut self,
+        contents: RestoreContents,
+        put: impl FnOnce(&mut Solver) -> Result<(), RestoreError>,
+    ) -> PyResult<()> {
+        put(&mut self.solver).map_err(|error| StateError::new_err(error.to_string()))?;
+        let state_hash = self.solver.hash_in_place();
+        self.note(sim_contract::Action::Restore { contents, state_hash }, Ok(Applied::InPlace));
+        self.make_step()
+    }
+
+    /// Returns the particles as they are after the last step.
+    fn particles(&mut self) -> Arc<Vec<ParticleState>> {
+        let solver = &self.solver;
+        let copy = || Arc::new(bytemuck::cast_slice(solver.particles()).to_vec());
+        Arc::clone(self.particles.get_or_insert_with(copy))
+    }
+
+    /// Completes the recording, if there is one.
+    fn finish(&mut self) -> PyResult<()> {
+        let Some(Recorded { path, file }) = self.recording.take() else { return Ok(()) };
+        file.finish().map(|_| ()).map_err(|error| recording_error(&path, &error))
+    }
+}
+
+impl Drop for Running {
+    /// A recording of a program that does not close it is complete, too.
+    fn drop(&mut self) {
+        // There is nobody to tell; `close` does.
+        _ = self.finish();
     }
 }
 
@@ -93,17 +167,33 @@ impl Simulation {
         py.detach(|| self.running.with(call))
     }
 
-    fn with_threads(scene: Scene, threads: usize, forces: bool) -> PyResult<Self> {
+    fn begin(
+        scene: Scene,
+        threads: usize,
+        has_forces: bool,
+        record: Option<(&Path, Existing)>,
+    ) -> PyResult<Self> {
         let mut solver = Solver::new(&scene);
-        solver.compute_forces(forces);
+        solver.compute_forces(has_forces);
         solver.set_threads(threads);
+        let recording = record.map(|(path, existing)| {
+            let file = SteppedRecording::begin(path, existing, &scene, &solver);
+            let file = file.map_err(|error| recording_error(path, &error))?;
+            Ok::<_, PyErr>(Recorded { path: path.to_owned(), file })
+        });
+        let recording = recording.transpose()?;
         let scene_hash = scene_hash(scene.to_toml().as_bytes());
-        let running = Running { solver, step: 0, is_changed: false };
-        let running = match running.solver.threads() {
-            1 => SharedRunning::OneThread(Mutex::new(running)),
-            _ => SharedRunning::Threads(OfProcess::new("simulation with several threads", running)),
+        let running = Running { solver, step: 0, is_changed: false, particles: None, recording };
+        let running = match (&running.recording, running.solver.threads()) {
+            (None, 1) => SharedRunning::Alone(Mutex::new(running)),
+            (None, _) => {
+                SharedRunning::OfProcess(OfProcess::new("simulation with several threads", running))
+            }
+            (Some(_), _) => {
+                SharedRunning::OfProcess(OfProcess::new("recorded simulation", running))
+            }
         };
-        Ok(Self { scene, scene_hash, running })
+        Ok(Self { scene, scene_hash, threads, has_forces, running })
     }
 
     /// Returns the number of elements of which a rejected command has named an unknown one.
@@ -123,14 +213,18 @@ impl Simulation {
 #[pymethods]
 impl Simulation {
     #[new]
-    #[pyo3(signature = (scene=None, threads=1, *, toml=None, forces=false))]
+    #[pyo3(signature = (scene=None, threads=1, *, toml=None, forces=false, record=None, overwrite=false))]
+    #[allow(clippy::too_many_arguments, reason = "these are the keywords of Python")]
     fn new(
         py: Python<'_>,
         scene: Option<PathBuf>,
         #[pyo3(from_py_with = arguments::threads)] threads: usize,
         toml: Option<&str>,
         forces: bool,
+        record: Option<PathBuf>,
+        overwrite: bool,
     ) -> PyResult<Self> {
+        let existing = if overwrite { Existing::Overwrite } else { Existing::Refuse };
         py.detach(|| {
             let scene = match (scene, toml) {
                 (Some(scene), None) => load_scene(&scene.to_string_lossy())?,
@@ -139,7 +233,7 @@ impl Simulation {
                 }
                 _ => return Err(PyTypeError::new_err("give either a scene or `toml`")),
             };
-            Self::with_threads(scene, threads, forces)
+            Self::begin(scene, threads, forces, record.as_deref().map(|path| (path, existing)))
         })
     }
 
@@ -152,7 +246,7 @@ impl Simulation {
     ) -> PyResult<()> {
         let mut left = count;
         loop {
-            left = self.with(py, |running| Ok(running.advance(left)))?;
+            left = self.with(py, |running| running.advance(left))?;
             if left == 0 {
                 return Ok(());
             }
@@ -166,27 +260,18 @@ impl Simulation {
     /// `load`, `rewind` and `restore` are rejected.
     fn apply(&self, py: Python<'_>, action: &Action) -> PyResult<()> {
         let action = action.0;
-        let result = self.with(py, |running| {
-            running.is_changed = true;
-            Ok(running.solver.apply(CLIENT_ID, &action))
-        })?;
-        let reason = match result {
-            Ok(Applied::Control(
-                Control::Load { .. } | Control::Rewind { .. } | Control::Restore,
-            )) => Reason::NoEffectHere,
-            Ok(_) => return Ok(()),
-            Err(reason) => reason,
-        };
+        let result = self.with(py, |running| Ok(running.apply(action)))?;
+        let Err(reason) = result else { return Ok(()) };
         let count = self.count(py, reason)?;
         let allowed = count.map(indices).or_else(|| action.allowed_values(reason));
         let message = format!("rejected: {}", cause(Some(reason), allowed.as_deref(), &action));
         Err(rejected(py, message, Some(reason), None))
     }
 
-    /// Returns a copy of the current state.
+    /// Returns the current state. It keeps its values when the simulation goes on.
     fn snapshot(&self, py: Python<'_>) -> PyResult<Snapshot> {
         self.with(py, |running| {
-            let particles = bytemuck::cast_slice(running.solver.particles()).to_vec();
+            let particles = running.particles();
             let forces = match forces_row(&running.solver, running.step) {
                 Some(row) => ForcesSource::Read(Some((row, self.rate()))),
                 None => ForcesSource::Unread(WITH_FORCES),
@@ -195,13 +280,13 @@ impl Simulation {
         })
     }
 
-    /// Copy of the current positions in metres. Shape: (particles, 3).
+    /// The current positions in metres, as a read-only view of `snapshot()`. Shape: (particles, 3).
     #[getter]
     fn positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
         view::vectors(&Bound::new(py, self.snapshot(py)?)?, POSITION)
     }
 
-    /// Copy of the current velocities in metres per second. Shape: (particles, 3).
+    /// The current velocities in metres per second, as a read-only view of `snapshot()`. Shape: (particles, 3).
     #[getter]
     fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
         view::vectors(&Bound::new(py, self.snapshot(py)?)?, VELOCITY)
@@ -209,8 +294,14 @@ impl Simulation {
 
     /// Hash of the current state.
     #[getter]
-    fn hash(&self, py: Python<'_>) -> PyResult<u64> {
-        self.with(py, |running| Ok(running.solver.state_hash()))
+    fn hash<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        hash(py, self.with(py, |running| Ok(running.solver.state_hash()))?)
+    }
+
+    /// The hash as recordings write it: 16 hexadecimal digits.
+    #[getter]
+    fn hash_hex(&self, py: Python<'_>) -> PyResult<String> {
+        self.with(py, |running| Ok(hash_hex(running.solver.state_hash())))
     }
 
     /// Number of steps so far.
@@ -307,7 +398,7 @@ impl Simulation {
         })
     }
 
-    /// Puts a state of the same scene in place at once. `step_count` continues.
+    /// Puts a state of the same scene in place, and makes the step that shows it. `step_count` continues.
     ///
     /// A `State` replaces everything, a `Snapshot` only positions and velocities. Raises `StateError` if it
     /// belongs to another scene.
@@ -321,7 +412,8 @@ impl Simulation {
         }
     }
 
-    /// Replaces the positions and velocities of all particles at once. Shape of both: (particles, 3).
+    /// Replaces the positions and velocities of all particles, and makes the step that shows them. Shape of both:
+    /// (particles, 3).
     fn set_motion(
         &self,
         py: Python<'_>,
@@ -331,15 +423,65 @@ impl Simulation {
         self.restore_motion(py, &motion(positions, velocities)?)
     }
 
-    /// Puts the initial state and parameters in place at once. `step_count` continues.
-    ///
-    /// A node spends a step on it, which shows the initial state.
+    /// Puts the initial state and parameters in place, and makes the step that shows them. `step_count` continues.
     fn reset(&self, py: Python<'_>) -> PyResult<()> {
         self.with(py, |running| {
-            let mut solver = Solver::new(&self.scene);
-            solver.set_threads(running.solver.threads());
-            solver.compute_forces(running.solver.forces().is_some());
-            (running.solver, running.is_changed) = (solver, false);
+            // A reset is never rejected.
+            _ = running.apply(sim_contract::Action::Reset);
+            running.make_step()
+        })
+    }
+
+    /// Returns a picture of the current state as `recorder export --png` draws it, from the top to the bottom: red,
+    /// green and blue. Shape: (height, width, 3).
+    ///
+    /// `size` is width and height in pixels. `view` is "front", "side", "top" or "iso"; by default it suits the scene.
+    /// The style "wires" shows particles, constraints and triangles, and "shaded" smooth surfaces. `bounds` are two
+    /// corners of the box that the picture shows, by default around the state: give them to keep the camera still.
+    #[pyo3(signature = (*, size=(960, 720), view=None, style="wires", bounds=None))]
+    fn render<'py>(
+        &self,
+        py: Python<'py>,
+        size: PixelSize,
+        view: Option<&str>,
+        style: &str,
+        bounds: Option<Corners>,
+    ) -> PyResult<Bound<'py, PyArray3<u8>>> {
+        let request = PictureRequest::new(size, view, style, bounds)?;
+        let (scene, rate) = (&self.scene, f64::from(self.rate()));
+        let (state, time_s) = self.with(py, |running| {
+            let state = SceneState::of_solver(&running.solver, scene, running.step);
+            Ok((state, running.step as f64 / rate))
+        })?;
+        let caption = Caption { scene_name: scene.name.clone(), up: scene.up, time_s };
+        request.draw(py, &state, Some(scene), caption)
+    }
+
+    /// Completes the recording, if there is one. The simulation can go on, unrecorded.
+    fn close(&self, py: Python<'_>) -> PyResult<()> {
+        self.with(py, Running::finish)
+    }
+
+    /// The arguments of the constructor, for `pickle` and `copy`: a copy is not recorded.
+    fn __getnewargs_ex__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(Bound<'py, PyTuple>, Bound<'py, PyDict>)> {
+        let arguments = PyDict::new(py);
+        arguments.set_item("toml", self.scene.to_toml())?;
+        arguments.set_item("threads", self.threads)?;
+        arguments.set_item("forces", self.has_forces)?;
+        Ok((PyTuple::empty(py), arguments))
+    }
+
+    /// Puts the state of a pickled or copied simulation in place.
+    fn _continue_from(&self, py: Python<'_>, state: &State, step_count: u64) -> PyResult<()> {
+        let keyframe = state.decoded_keyframe()?;
+        self.with(py, |running| {
+            let restored =
+                running.solver.restore(bytemuck::cast_slice(&state.particles), &keyframe);
+            restored.map_err(|error| StateError::new_err(error.to_string()))?;
+            (running.step, running.particles) = (step_count, None);
             Ok(())
         })
     }
@@ -363,24 +505,14 @@ impl Simulation {
             )));
         }
         let keyframe = state.decoded_keyframe()?;
-        self.with(py, |running| {
-            let particles = bytemuck::cast_slice(&state.particles);
-            let restored = running.solver.restore(particles, &keyframe);
-            restored.map_err(|error| StateError::new_err(error.to_string()))?;
-            running.is_changed = false;
-            Ok(())
-        })
+        let particles = bytemuck::cast_slice(&state.particles);
+        let put = |solver: &mut Solver| solver.put_in_place(particles, &keyframe);
+        self.with(py, |running| running.put_in_place(RestoreContents::State, put))
     }
 
     fn restore_motion(&self, py: Python<'_>, particles: &[ParticleState]) -> PyResult<()> {
-        self.with(py, |running| {
-            let restored = running.solver.put_motion_in_place(bytemuck::cast_slice(particles));
-            restored.map_err(|error| StateError::new_err(error.to_string()))?;
-            // It integrates nothing, and completes the state.
-            running.solver.step();
-            running.is_changed = false;
-            Ok(())
-        })
+        let put = |solver: &mut Solver| solver.put_motion_in_place(bytemuck::cast_slice(particles));
+        self.with(py, |running| running.put_in_place(RestoreContents::Motion, put))
     }
 
     fn header(&self, running: &Running) -> SnapshotHeader {

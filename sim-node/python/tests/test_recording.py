@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import json
 import os
 import signal
 import struct
@@ -9,14 +11,16 @@ import subprocess
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Literal
 
 import catenary
 import numpy as np
 import pytest
-from conftest import DEADLINE, Interrupt, StartNode
+from conftest import DEADLINE, PROGRAMS, Interrupt, StartNode
 from edits import MAGIC, records
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
+from PIL import Image
 
 Simulate = Callable[..., Path]
 
@@ -69,6 +73,67 @@ def test_a_recording_becomes_arrays(recording: catenary.Recording) -> None:
     assert arrays.positions.shape == arrays.velocities.shape == (3, 168, 3)
     assert np.array_equal(arrays.positions[1], recording[150].positions)
     assert arrays.hashes[2] == recording[200].hash
+    # Those of the steps in between belong to it, and those after it do not.
+    assert [(row["step"], row["kind"]) for row in arrays.commands] == [(100, "grab"), (200, "cut")]
+    assert arrays.forces is None
+    grab = catenary.Action.from_dict(arrays.commands[0])
+    assert grab.to_dict()["particle"] == arrays.commands[0]["particle"]
+
+
+def test_forces_become_arrays(simulate: Callable[..., Path], tmp_path: Path) -> None:
+    commands = tmp_path / "commands.jsonl"
+    commands.write_text('{"step": 20, "kind": "pin", "particle": 3}')
+    path = simulate("drop-box", "--steps", "40", "--forces", "--commands", str(commands))
+    with catenary.open(path) as recording:
+        arrays = recording.to_numpy()
+        forces = arrays.forces
+        assert forces is not None and forces.fixed_particles.tolist() == [3]
+        assert forces.collider_impulses.shape == (41, len(recording.forces(1).colliders), 3)
+        assert np.isnan(forces.collider_impulses[0]).all(), "no step has led to the first state"
+        assert np.isnan(forces.fixed_impulses[:20]).all()
+        for step in (20, 33, 40):
+            row = recording.forces(step)
+            assert np.array_equal(forces.collider_impulses[step], row.colliders.impulse)
+            assert np.array_equal(forces.collider_contacts[step], row.colliders.contacts)
+            assert np.array_equal(forces.fixed_impulses[step], row.impulses)
+    file = tmp_path / "run.npz"
+    subprocess.run([PROGRAMS / "recorder", "export", path, "--npz", file], check=True, timeout=DEADLINE)
+    exported = np.load(file)
+    for field in dataclasses.fields(forces):
+        found = getattr(forces, field.name)
+        assert np.array_equal(exported[field.name], found, equal_nan=found.dtype.kind == "f"), field.name
+    assert [json.loads(text) for text in exported["commands"]] == arrays.commands
+
+
+@pytest.mark.parametrize("style", ["wires", "shaded"])
+def test_pictures_are_those_of_the_export(
+    simulate: Callable[..., Path], tmp_path: Path, style: Literal["wires", "shaded"]
+) -> None:
+    path = simulate("covered-bust", "--steps", "30")
+    folder = tmp_path / "pictures"
+    options = ["--at", "125ms", "--size", "320x240", "--style", style]
+    command = [str(PROGRAMS / "recorder"), "export", str(path), "--png", str(folder), *options]
+    subprocess.run(command, check=True, capture_output=True, timeout=DEADLINE)
+    (file,) = folder.iterdir()
+    expected = np.asarray(Image.open(file).convert("RGB"))
+    simulation = catenary.Simulation("covered-bust")
+    simulation.step(30)
+    with catenary.open(path) as recording:
+        pictures = [
+            recording.render(30, size=(320, 240), style=style),
+            simulation.render(size=(320, 240), style=style),
+        ]
+        for picture in pictures:
+            assert picture.dtype == np.uint8 and picture.shape == (240, 320, 3)
+            assert np.array_equal(picture, expected)
+        near = recording.render(30, size=(320, 240), style=style, bounds=((0, 0, 0), np.full(3, 0.1, np.float32)))
+        assert not np.array_equal(near, expected)
+        with pytest.raises(KeyError, match="31"):
+            recording.render(31)
+    with pytest.raises(ValueError, match=r"`size` is \(8, 240\) \(allowed: 16 to 8192"):
+        simulation.render(size=(8, 240))
+    with pytest.raises(ValueError, match=r"`view` is 'up' \(allowed: front, side, top, iso\)"):
+        simulation.render(view="up")  # type: ignore[arg-type]
 
 
 def test_arrays_of_no_snapshot_are_refused_with_the_recorded_steps(

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import copy
+import json
 import os
 import pickle
+import subprocess
 import threading
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
@@ -14,7 +17,7 @@ from typing import Any
 import catenary
 import numpy as np
 import pytest
-from conftest import StartNode
+from conftest import DEADLINE, PROGRAMS, StartNode
 
 ABC: Any = "abc"
 
@@ -48,7 +51,7 @@ def test_a_state_continues_in_another_simulation_and_after_pickling() -> None:
     assert state.hash == first.hash
     second = catenary.Simulation("curtain")
     second.restore(state)
-    assert second.hash == first.hash and second.step_count == 0
+    assert second.hash == first.hash and second.step_count == 1
     first.step(100)
     second.step(100)
     assert second.hash == first.hash
@@ -138,7 +141,8 @@ def test_motion_is_replaced_at_once_as_in_a_node(start_node: StartNode) -> None:
     still = simulation.snapshot()
     for target in (node, simulation):
         target.set_motion(still.positions + np.float32(0.25), 0 * still.velocities)
-    assert simulation.step_count == 10 and simulation.hash == node.latest().hash
+    assert simulation.step_count == node.latest().step == 11
+    assert simulation.hash == node.latest().hash
     assert simulation.positions == pytest.approx(still.positions + 0.25)
     assert simulation.state().hash == simulation.hash
     assert simulation.colliders() == node.colliders() != []
@@ -192,19 +196,19 @@ def test_a_reset_brings_the_initial_state_and_parameters_back() -> None:
     simulation.step(10)
     assert simulation.hash != initial
     simulation.reset()
-    assert simulation.hash == initial and simulation.step_count == 10
+    assert simulation.hash == initial and simulation.step_count == 11
     assert simulation.parameters() == catenary.Simulation("curtain").parameters()
 
 
 def test_sixteen_simulations_run_in_sixteen_threads() -> None:
-    def run(seed: int) -> int:
+    def run(seed: int) -> np.uint64:
         simulation = catenary.Simulation("curtain")
         simulation.set(damping=seed % 4 / 4)
         for _ in range(20):
             simulation.step(50)
         return simulation.hash
 
-    hashes = [0] * 16
+    hashes = [np.uint64(0)] * 16
 
     def put(seed: int) -> None:
         hashes[seed] = run(seed)
@@ -261,6 +265,171 @@ def test_a_state_waits_for_the_step_of_a_command() -> None:
         simulation.state()
     simulation.step()
     assert simulation.state().hash == simulation.hash
+
+
+def test_arrays_are_views_of_one_snapshot_that_no_step_changes() -> None:
+    simulation = catenary.Simulation("curtain")
+    positions, velocities = simulation.positions, simulation.velocities
+    assert np.shares_memory(positions, simulation.positions), "one copy for each step"
+    assert np.shares_memory(simulation.snapshot().positions, positions)
+    for array in (positions, velocities):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 0
+        with pytest.raises(ValueError, match="WRITEABLE"):
+            array.flags.writeable = True
+    kept = positions.copy()
+    simulation.step(10)
+    assert np.array_equal(positions, kept)
+    assert not np.array_equal(simulation.positions, kept)
+    simulation.reset()
+    assert np.array_equal(simulation.positions, kept)
+
+
+def test_hashes_are_numbers_of_numpy_and_text_of_json() -> None:
+    simulation = catenary.Simulation("curtain")
+    hashes = []
+    for _ in range(64):
+        simulation.step()
+        hashes.append(simulation.hash)
+    array = np.array(hashes)
+    assert array.dtype == np.uint64 and array.tolist() == [int(one) for one in hashes]
+    assert max(array) > np.iinfo(np.int64).max, "an int would not fit"
+    for one in (simulation, simulation.snapshot(), simulation.state()):
+        assert isinstance(one.hash, np.uint64)
+        assert json.loads(json.dumps(one.hash_hex)) == f"{one.hash:016x}"
+    assert simulation.state().scene_hash == simulation.topology().scene_hash
+    # As the vectorized environments of Gymnasium collect `info`: an array of the type of the first value.
+    info = np.zeros(2, dtype=type(simulation.hash))
+    info[1] = simulation.hash
+    assert info[1] == simulation.hash
+
+
+class Environment(catenary.Simulation):
+    """A simulation with attributes of its own."""
+
+    goal = 0.0
+
+
+COPIES: list[Callable[[Environment], Environment]] = [
+    copy.copy,
+    copy.deepcopy,
+    lambda one: pickle.loads(pickle.dumps(one)),
+    lambda one: pickle.loads(pickle.dumps(one, protocol=2)),
+]
+
+
+@pytest.mark.parametrize("make_copy", COPIES)
+def test_a_copy_goes_on_with_the_same_bits(make_copy: Callable[[Environment], Environment]) -> None:
+    first = Environment("carried-cloth", threads=2, forces=True)
+    first.goal = 3.0
+    first.set(damping=0.3, gravity=(1, -5, 0))
+    first.grab(3, (0.5, 0.2, 0.3), over=0.25)
+    first.cut_radius((0, 0, 0), 0.2)
+    first.step(30)
+    second = make_copy(first)
+    assert isinstance(second, Environment) and second.goal == 3.0
+    assert (second.hash, second.step_count) == (first.hash, 30)
+    assert second.parameters() == first.parameters() and second.scene() == first.scene()
+    assert np.array_equal(second.torn(), first.torn())
+    for one in (first, second):
+        one.move(3, (0.1, 0.4, 0.3))
+        one.step(100)
+    assert second.hash == first.hash
+    assert np.array_equal(second.forces().impulses, first.forces().impulses)
+    first.pin(1)
+    with pytest.raises(catenary.StateError, match="call `step"):
+        make_copy(first)
+
+
+def advance(simulation: catenary.Simulation) -> catenary.Simulation:
+    simulation.step(100)
+    return simulation
+
+
+def test_simulations_go_to_other_processes_and_come_back() -> None:
+    simulation = catenary.Simulation("curtain")
+    simulation.step(5)
+    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+        (other,) = pool.map(advance, [simulation])
+    simulation.step(100)
+    assert (other.hash, other.step_count) == (simulation.hash, 105)
+
+
+@pytest.mark.parametrize("forces", [False, True])
+def test_a_recorded_simulation_has_the_bytes_of_recorder_simulate(
+    tmp_path: Path, simulate: Callable[..., Path], forces: bool
+) -> None:
+    path = tmp_path / "own.mcap"
+    with catenary.Simulation("carried-cloth", record=path, forces=forces) as simulation:
+        simulation.step(100)
+        simulation.grab(3, (0.5, 0.2, 0.3), over=0.25)
+        simulation.set(damping=0.3)
+        with pytest.raises(catenary.Rejected):
+            simulation.pin(10**6)
+        simulation.step(250)
+        simulation.cut_radius((0, 0, 0), 0.2)
+        simulation.mark("here")
+        simulation.reset()
+        simulation.step(30)
+        assert not path.exists(), "it gets its name when it is complete"
+        simulation.cut(3)
+    options = ["--forces"] if forces else []
+    again = simulate("carried-cloth", "--steps", "381", "--commands", str(path), *options)
+    assert path.read_bytes() == again.read_bytes()
+    lines = [
+        {"step": 101, "kind": "grab", "particle": 3, "target": [0.5, 0.2, 0.3], "over_s": 0.25},
+        {"step": 101, "kind": "set", "parameter": "damping", "value": 0.3},
+        {"step": 101, "kind": "pin", "particle": 10**6},
+        {"step": 351, "kind": "cut_radius", "center": [0, 0, 0], "radius": 0.2},
+        {"step": 351, "kind": "mark", "text": "here"},
+        {"step": 351, "kind": "reset"},
+    ]
+    commands = tmp_path / "commands.jsonl"
+    commands.write_text("\n".join(map(json.dumps, lines)))
+    again.unlink()
+    again = simulate("carried-cloth", "--steps", "381", "--commands", str(commands), *options)
+    assert path.read_bytes() == again.read_bytes()
+    assert catenary.verify(path).is_identical
+    checked = subprocess.run([PROGRAMS / "recorder", "check", path], timeout=DEADLINE)
+    assert checked.returncode == 0, "the checksums are right"
+
+
+def test_a_recorded_simulation_can_be_restored_and_proved(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    simulation = catenary.Simulation("curtain", record=path, threads=2)
+    simulation.step(20)
+    state = simulation.state()
+    simulation.step(20)
+    simulation.restore(state)
+    simulation.step(5)
+    simulation.set_motion(simulation.positions, 0 * simulation.velocities)
+    simulation.step(5)
+    last = simulation.hash
+    with pytest.raises(catenary.RecordingError, match="run.mcap"):
+        catenary.Simulation("curtain", record=path)
+    del simulation
+    recording = catenary.open(path)
+    assert (recording.last_step, recording[52].hash) == (52, last)
+    assert recording[41].hash == state.hash
+    assert catenary.verify(path).is_identical
+    with pytest.raises(catenary.RecordingError, match="exists"):
+        catenary.Simulation("curtain", record=path)
+    catenary.Simulation("curtain", record=path, overwrite=True).close()
+    assert catenary.open(path).last_step == 0
+
+
+def test_a_recorded_simulation_refuses_a_fork(tmp_path: Path) -> None:
+    simulation = catenary.Simulation("flag", record=tmp_path / "run.mcap")
+    child = os.fork()
+    if child == 0:
+        try:
+            simulation.step()
+        except catenary.Error as error:
+            os._exit(0 if "fork" in str(error) else 2)
+        os._exit(1)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+    simulation.close()
+    assert catenary.open(tmp_path / "run.mcap").last_step == 0
 
 
 def test_a_falling_particle_follows_the_closed_form() -> None:

@@ -44,7 +44,7 @@ from catenary._errors import (
     TooManySnapshots,
 )
 from catenary._node import Batch, Lockstep, Node
-from catenary._recording import Arrays, Recording, Steps
+from catenary._recording import Arrays, ForceArrays, Recording, Steps
 from catenary._simulation import Simulation
 
 __all__ = [
@@ -61,6 +61,7 @@ __all__ = [
     "Bends",
     "ColliderForces",
     "Error",
+    "ForceArrays",
     "Forces",
     "Lockstep",
     "Node",

@@ -76,8 +76,11 @@ class Snapshot:
     def time(self) -> float:
         """Simulated time since step 0, in seconds."""
     @property
-    def hash(self) -> int:
+    def hash(self) -> np.uint64:
         """Hash of the state: equal states have equal hashes on every machine."""
+    @property
+    def hash_hex(self) -> str:
+        """The hash as recordings write it: 16 hexadecimal digits."""
     @property
     def run_id(self) -> int:
         """Number of the run. Steps begin at 0 in each run."""
@@ -148,7 +151,7 @@ class Topology:
     def method(self) -> Literal["xpbd", "pbd"]:
         """Method of the solver."""
     @property
-    def scene_hash(self) -> int:
+    def scene_hash(self) -> np.uint64:
         """Hash of the scene: a state belongs to the scene with the same one."""
     def __len__(self) -> int: ...
 
@@ -278,11 +281,14 @@ class State:
 
     def __new__(cls, scene_hash: int, particles: bytes, keyframe: bytes) -> Self: ...
     @property
-    def scene_hash(self) -> int:
+    def scene_hash(self) -> np.uint64:
         """Hash of the scene that the state belongs to."""
     @property
-    def hash(self) -> int:
+    def hash(self) -> np.uint64:
         """Hash of the state, as in `Snapshot.hash`."""
+    @property
+    def hash_hex(self) -> str:
+        """The hash as recordings write it: 16 hexadecimal digits."""
     def __len__(self) -> int: ...
     def __getnewargs__(self) -> tuple[int, bytes, bytes]: ...
 
@@ -447,6 +453,17 @@ class Lockstep:
         """Outcomes that came with the last snapshot."""
     def send(self, action: Action) -> int:
         """Sends an action for the next step. Returns its sequence number."""
+    def restore(self, state: State | Snapshot) -> int:
+        """Puts a state in place in the next step, which shows it without further changes. Returns the sequence number.
+
+        A `State` replaces everything. A `Snapshot` replaces only positions and velocities.
+        """
+    def set_motion(self, positions: npt.ArrayLike, velocities: npt.ArrayLike) -> int:
+        """Replaces the positions and velocities of all particles in the next step. Shape of both: (particles, 3)."""
+    def forces(self) -> Forces | None:
+        """Returns the forces of the step of the last snapshot. None if the node has not computed them: the first call makes
+        it compute them from the next step on.
+        """
     def __enter__(self) -> Self: ...
     def __exit__(
         self,
@@ -466,6 +483,8 @@ class Simulation:
         *,
         toml: str | None = None,
         forces: bool = False,
+        record: str | PathLike[str] | None = None,
+        overwrite: bool = False,
     ) -> Self: ...
     def step(self, count: int = 1) -> None:
         """Makes `count` steps. Other threads of the interpreter run meanwhile; Ctrl-C ends it between steps."""
@@ -476,16 +495,19 @@ class Simulation:
         `load`, `rewind` and `restore` are rejected.
         """
     def snapshot(self) -> Snapshot:
-        """Returns a copy of the current state."""
+        """Returns the current state. It keeps its values when the simulation goes on."""
     @property
     def positions(self) -> Floats:
-        """Copy of the current positions in metres. Shape: (particles, 3)."""
+        """The current positions in metres, as a read-only view of `snapshot()`. Shape: (particles, 3)."""
     @property
     def velocities(self) -> Floats:
-        """Copy of the current velocities in metres per second. Shape: (particles, 3)."""
+        """The current velocities in metres per second, as a read-only view of `snapshot()`. Shape: (particles, 3)."""
     @property
-    def hash(self) -> int:
+    def hash(self) -> np.uint64:
         """Hash of the current state."""
+    @property
+    def hash_hex(self) -> str:
+        """The hash as recordings write it: 16 hexadecimal digits."""
     @property
     def step_count(self) -> int:
         """Number of steps so far."""
@@ -521,18 +543,37 @@ class Simulation:
         Raises `StateError` between a command and the step that shows it.
         """
     def restore(self, state: State | Snapshot) -> None:
-        """Puts a state of the same scene in place at once. `step_count` continues.
+        """Puts a state of the same scene in place, and makes the step that shows it. `step_count` continues.
 
         A `State` replaces everything, a `Snapshot` only positions and velocities. Raises `StateError` if it
         belongs to another scene.
         """
     def set_motion(self, positions: npt.ArrayLike, velocities: npt.ArrayLike) -> None:
-        """Replaces the positions and velocities of all particles at once. Shape of both: (particles, 3)."""
-    def reset(self) -> None:
-        """Puts the initial state and parameters in place at once. `step_count` continues.
-
-        A node spends a step on it, which shows the initial state.
+        """Replaces the positions and velocities of all particles, and makes the step that shows them. Shape of both:
+        (particles, 3).
         """
+    def reset(self) -> None:
+        """Puts the initial state and parameters in place, and makes the step that shows them. `step_count` continues."""
+    def render(
+        self,
+        *,
+        size: tuple[int, int] = (960, 720),
+        view: Literal["front", "side", "top", "iso"] | None = None,
+        style: Literal["wires", "shaded"] = "wires",
+        bounds: tuple[Vector, Vector] | None = None,
+    ) -> npt.NDArray[np.uint8]:
+        """Returns a picture of the current state as `recorder export --png` draws it, from the top to the bottom: red,
+        green and blue. Shape: (height, width, 3).
+
+        `size` is width and height in pixels. `view` is "front", "side", "top" or "iso"; by default it suits the scene.
+        The style "wires" shows particles, constraints and triangles, and "shaded" smooth surfaces. `bounds` are two
+        corners of the box that the picture shows, by default around the state: give them to keep the camera still.
+        """
+    def close(self) -> None:
+        """Completes the recording, if there is one. The simulation can go on, unrecorded."""
+    def __getnewargs_ex__(self) -> tuple[tuple[()], dict[str, Any]]: ...
+    def _continue_from(self, state: State, step_count: int) -> None:
+        """Puts the state of a pickled or copied simulation in place."""
     def __len__(self) -> int: ...
 
 class Recording:
@@ -579,6 +620,24 @@ class Recording:
 
         Raises `KeyError` for a step before the first or after the last one, and `RecordingError` if the file has no
         forces of the step: it was made without `--forces`, or no step has led to its first state.
+        """
+    def render(
+        self,
+        step: int,
+        *,
+        size: tuple[int, int] = (960, 720),
+        view: Literal["front", "side", "top", "iso"] | None = None,
+        style: Literal["wires", "shaded"] = "wires",
+        bounds: tuple[Vector, Vector] | None = None,
+    ) -> npt.NDArray[np.uint8]:
+        """Returns a picture of a recorded step as `recorder export --png` draws it, from the top to the bottom: red,
+        green and blue. Shape: (height, width, 3).
+
+        `size` is width and height in pixels. `view` is "front", "side", "top" or "iso"; by default it suits the scene.
+        The style "wires" shows particles, constraints and triangles, and "shaded" smooth surfaces. `bounds` are two
+        corners of the box that the picture shows, by default around the state: give them to keep the camera still.
+
+        Raises `KeyError` for a step that was not recorded.
         """
     def steps(self) -> dict[str, npt.NDArray[Any]]:
         """Returns a table of all recorded steps, by column: `pandas.DataFrame(recording.steps())`."""

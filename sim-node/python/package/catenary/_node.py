@@ -85,7 +85,10 @@ class Node(Commands[Outcome], _catenary.Node):
         return self._shown(outcome, outcome.step + count - 1, timeout)
 
     def reset(self) -> Outcome:
-        """Puts the initial state in place. The step number continues."""
+        """Puts the initial state in place. The step number continues.
+
+        A running node goes on at once. For episodes that repeat bit for bit, reset within `lockstep`.
+        """
         return self._shown(self.request(Action.reset()))
 
     def rewind(self, *, to_step: int | None = None, back_steps: int | None = None) -> Outcome:
@@ -117,10 +120,10 @@ class Node(Commands[Outcome], _catenary.Node):
         """Joins the lockstep: `with node.lockstep() as steps: for snapshot in steps: ...`.
 
         The node publishes a snapshot, waits for the body of the loop, and applies the commands of the body
-        before its next step. So the same program gives the same states in every run, at any speed. With
-        `every`, the program takes part at the steps that are multiples of it. `timeout` is the longest wait
-        for the node's admission, in seconds. Attach with a fixed `client_id` to keep the order among several
-        members.
+        before its next step. So the same program gives the same states in every run, at any speed, from
+        `steps.reset()` on. With `every`, the program takes part in every `every`-th step, counted from the first
+        snapshot, and again from each reset, load, rewind and restored state. `timeout` is the longest wait for the
+        node's admission, in seconds. Attach with a fixed `client_id` to keep the order among several members.
         """
         return Lockstep(self, every, timeout=timeout)
 
@@ -187,9 +190,22 @@ class Batch(Commands[int]):
 class Lockstep(Commands[int], _catenary.Lockstep):
     """A membership in the lockstep: an iterator of snapshots that the node waits at.
 
-    Its commands take effect in the step after the snapshot. They return a sequence number at once; a rejected
-    command raises `Rejected` at the next snapshot. `outcomes` has the outcomes that came with the snapshot.
+    Its commands take effect in the step after the snapshot; those before the first snapshot show in it. They
+    return a sequence number at once; a rejected command raises `Rejected` at the next snapshot. `outcomes` has the
+    outcomes that came with the snapshot.
     """
 
     def _perform(self, action: Action) -> int:
         return self.send(action)
+
+    def reset(self) -> int:
+        """Puts the initial state in place: the next snapshot shows it. The step number continues."""
+        return self.send(Action.reset())
+
+    def rewind(self, *, to_step: int | None = None, back_steps: int | None = None) -> int:
+        """Puts the nearest kept state at or before a step in place: the next snapshot shows it. See `Node.rewind`."""
+        return self.send(Action.rewind(to_step=to_step, back_steps=back_steps))
+
+    def load(self, scene: str | PathLike[str]) -> int:
+        """Replaces the scene: the next snapshot shows its initial state. See `Node.load`."""
+        return self.send(Action.load(scene))

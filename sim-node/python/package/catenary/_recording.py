@@ -6,13 +6,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from types import TracebackType
-from typing import overload
+from typing import Any, overload
 
 import numpy as np
 import numpy.typing as npt
 
 from catenary import _catenary
-from catenary._catenary import Snapshot
+from catenary._catenary import Forces, Snapshot
+from catenary._errors import RecordingError
 
 
 class Recording(_catenary.Recording):
@@ -73,6 +74,11 @@ class Recording(_catenary.Recording):
         """
         return self[start:stop:every].to_numpy()
 
+    @cached_property
+    def _all_outcomes(self) -> list[dict[str, Any]]:
+        # Reads the file once.
+        return self.outcomes()
+
     def __enter__(self) -> Recording:
         return self
 
@@ -109,6 +115,35 @@ class Arrays:
     """Positions in metres. Shape: (snapshots, particles, 3)."""
     velocities: npt.NDArray[np.float32]
     """Velocities in metres per second. Shape: (snapshots, particles, 3)."""
+    commands: list[dict[str, Any]]
+    """Outcomes of the commands from the first to the last of these steps, as in `Recording.outcomes()`. The `step` of
+    each is the first that shows its effect; `Action.from_dict` returns its action."""
+    forces: ForceArrays | None
+    """Forces of the steps. None if the recording has none: it was made without `--forces`."""
+
+
+@dataclass
+class ForceArrays:
+    """The forces of a range of steps, with the names of `recorder export --npz`.
+
+    Impulses are in N s, angular impulses in N m s: times steps per second, they are forces and torques. They are NaN,
+    and contacts 0, where the recording has none, as in its first step, or where a particle was not fixed.
+    """
+
+    collider_impulses: npt.NDArray[np.float32]
+    """Impulses on each collider. Shape: (snapshots, colliders, 3)."""
+    collider_angular_impulses: npt.NDArray[np.float32]
+    """Angular impulses about the center of each collider. Shape: (snapshots, colliders, 3)."""
+    collider_contacts: npt.NDArray[np.uint32]
+    """Largest number of particles in contact in one substep. Shape: (snapshots, colliders)."""
+    anchor_impulses: npt.NDArray[np.float32]
+    """Impulses on each anchor. Shape: (snapshots, anchors, 3)."""
+    anchor_angular_impulses: npt.NDArray[np.float32]
+    """Angular impulses about the center of each anchor. Shape: (snapshots, anchors, 3)."""
+    fixed_particles: npt.NDArray[np.uint32]
+    """Indices of the particles that are pinned, grabbed or anchored in any of the steps. Shape: (P,)."""
+    fixed_impulses: npt.NDArray[np.float32]
+    """Impulses on each of `fixed_particles`. Shape: (snapshots, P, 3)."""
 
 
 class Steps:
@@ -149,6 +184,8 @@ class Steps:
             hashes=np.empty(len(steps), np.uint64),
             positions=np.empty(shape, np.float32),
             velocities=np.empty(shape, np.float32),
+            commands=self._commands(int(steps[0]), int(steps[-1])),
+            forces=_stacked([self._forces(int(step)) for step in steps]),
         )
         for index, snapshot in enumerate(self):
             arrays.times[index] = snapshot.time
@@ -156,3 +193,37 @@ class Steps:
             arrays.positions[index] = snapshot.positions
             arrays.velocities[index] = snapshot.velocities
         return arrays
+
+    def _commands(self, first: int, last: int) -> list[dict[str, Any]]:
+        return [row for row in self._recording._all_outcomes if first <= row["step"] <= last]
+
+    def _forces(self, step: int) -> Forces | None:
+        try:
+            return self._recording.forces(step)
+        except RecordingError:
+            return None
+
+
+def _stacked(steps: list[Forces | None]) -> ForceArrays | None:
+    """The forces of each step in arrays. None if no step has any."""
+    known = [(index, forces) for index, forces in enumerate(steps) if forces is not None]
+    if not known:
+        return None
+    one = known[0][1]
+    fixed = np.unique(np.concatenate([forces.particles for _, forces in known]))
+    vectors = {name: np.full((len(steps), count, 3), np.nan, np.float32) for name, count in {
+        "collider_impulses": len(one.colliders),
+        "collider_angular_impulses": len(one.colliders),
+        "anchor_impulses": len(one.anchors),
+        "anchor_angular_impulses": len(one.anchors),
+        "fixed_impulses": len(fixed),
+    }.items()}
+    contacts = np.zeros((len(steps), len(one.colliders)), np.uint32)
+    for index, forces in known:
+        vectors["collider_impulses"][index] = forces.colliders.impulse
+        vectors["collider_angular_impulses"][index] = forces.colliders.angular_impulse
+        vectors["anchor_impulses"][index] = forces.anchors.impulse
+        vectors["anchor_angular_impulses"][index] = forces.anchors.angular_impulse
+        vectors["fixed_impulses"][index, np.searchsorted(fixed, forces.particles)] = forces.impulses
+        contacts[index] = forces.colliders.contacts
+    return ForceArrays(collider_contacts=contacts, fixed_particles=fixed, **vectors)

@@ -8,7 +8,7 @@ use recorder::LogReader;
 use sim_contract::{BendState, ConstraintState, LoadHeader, Method, Triangle, read_scene_file};
 use sim_solver::{Scene, SceneError, builtin};
 
-use crate::convert::rows;
+use crate::convert::{hash, rows};
 use crate::error::{SceneError as PythonSceneError, load_error, recording_error};
 
 /// Returns the names of the built-in scenes.
@@ -52,7 +52,7 @@ pub(crate) struct Topology {
     /// Method of the solver.
     method: &'static str,
     /// Hash of the scene: a state belongs to the scene with the same one.
-    scene_hash: u64,
+    scene_hash: Py<PyAny>,
 }
 
 impl Topology {
@@ -70,7 +70,7 @@ impl Topology {
             origin: header.origin,
             rate: header.rate_hz,
             method: Method::from_number(header.method).map_or("unknown", Method::name),
-            scene_hash: header.scene_hash,
+            scene_hash: hash(py, header.scene_hash)?.unbind(),
         })
     }
 }

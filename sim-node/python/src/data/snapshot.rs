@@ -1,11 +1,14 @@
 //! A state of the particles.
 
+use std::sync::Arc;
+
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use recorder::ForcesRow;
 use sim_contract::{ParticleState, SnapshotFlags, SnapshotHeader};
 
+use crate::convert::{hash, hash_hex};
 use crate::data::forces::Forces;
 use crate::data::view;
 use crate::error::Error;
@@ -18,7 +21,7 @@ enum Memory {
     /// In shared memory, lent by a node.
     Shared(OfProcess<sim_contract::Snapshot>),
     /// In the memory of this process.
-    Own(Vec<ParticleState>),
+    Own(Arc<Vec<ParticleState>>),
 }
 
 /// Steps per second.
@@ -71,7 +74,7 @@ impl Snapshot {
 
     pub(crate) fn own(
         header: SnapshotHeader,
-        particles: Vec<ParticleState>,
+        particles: Arc<Vec<ParticleState>>,
         forces: ForcesSource,
     ) -> Self {
         Self { header, memory: Memory::Own(particles), forces }
@@ -93,6 +96,11 @@ impl Snapshot {
             Memory::Shared(snapshot) => snapshot.with(|snapshot| Ok(call(snapshot.particles()))),
             Memory::Own(particles) => Ok(call(particles)),
         }
+    }
+
+    /// Returns the forces of the step; `None` if they were not computed, or not read.
+    pub(crate) fn forces_read(&self, py: Python<'_>) -> PyResult<Option<Forces>> {
+        if matches!(self.forces, ForcesSource::Unread(_)) { Ok(None) } else { self.forces(py) }
     }
 
     pub(crate) fn to_vec(&self) -> PyResult<Vec<ParticleState>> {
@@ -166,8 +174,14 @@ impl Snapshot {
 
     /// Hash of the state: equal states have equal hashes on every machine.
     #[getter]
-    fn hash(&self) -> u64 {
-        self.header.state_hash
+    fn hash<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        hash(py, self.header.state_hash)
+    }
+
+    /// The hash as recordings write it: 16 hexadecimal digits.
+    #[getter]
+    fn hash_hex(&self) -> String {
+        hash_hex(self.header.state_hash)
     }
 
     /// Number of the run. Steps begin at 0 in each run.
@@ -237,7 +251,7 @@ impl Snapshot {
 
     /// Returns the snapshot in the memory of this process, so that it can be kept.
     fn copy(&self, py: Python<'_>) -> PyResult<Self> {
-        Ok(Self::own(self.header, self.to_vec()?, self.forces.clone_ref(py)))
+        Ok(Self::own(self.header, Arc::new(self.to_vec()?), self.forces.clone_ref(py)))
     }
 
     fn __len__(&self) -> usize {

@@ -6,6 +6,7 @@ use pyo3::types::PyBytes;
 use sim_contract::{Change, Endpoint, GivenState, ParticleState, Tap};
 use sim_solver::Keyframe;
 
+use crate::convert::{hash, hash_hex};
 use crate::error::{StateError, Timeout, attach_error};
 use crate::patience::{Patience, wait};
 
@@ -58,14 +59,20 @@ impl State {
 
     /// Hash of the scene that the state belongs to.
     #[getter]
-    fn scene_hash(&self) -> u64 {
-        self.scene_hash
+    fn scene_hash<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        hash(py, self.scene_hash)
     }
 
     /// Hash of the state, as in `Snapshot.hash`.
     #[getter]
-    fn hash(&self) -> u64 {
-        self.hash
+    fn hash<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        hash(py, self.hash)
+    }
+
+    /// The hash as recordings write it: 16 hexadecimal digits.
+    #[getter]
+    fn hash_hex(&self) -> String {
+        hash_hex(self.hash)
     }
 
     fn __len__(&self) -> usize {
