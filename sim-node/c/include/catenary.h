@@ -27,6 +27,7 @@
 #define CATENARY_PARTICLE_FROZEN 8  // excluded: its state was not finite
 #define CATENARY_SNAPSHOT_PAUSED 1  // the node was paused in this step
 #define CATENARY_SNAPSHOT_REPLAY 2  // the writer plays a recording
+#define CATENARY_SNAPSHOT_IN_PLACE 4  // a command has put the state in place
 #define CATENARY_STATUS_PAUSED 1  // the node waits for resume or step
 #define CATENARY_STATUS_REPLAY 2  // the writer plays a recording
 #define CATENARY_STATUS_AT_END 4  // the recording has ended

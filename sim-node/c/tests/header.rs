@@ -65,7 +65,7 @@ const TYPES: [(&str, &str); 40] = [
 /// Constants with their names in the header, their values, and their meanings.
 #[rustfmt::skip]
 #[allow(clippy::cast_possible_truncation, reason = "small limits")]
-const CONSTANTS: [(&str, &str, u32, &str); 28] = [
+const CONSTANTS: [(&str, &str, u32, &str); 29] = [
     ("CONTRACT_VERSION", "CATENARY_CONTRACT_VERSION", CONTRACT_VERSION, "version of the layouts of this header"),
     ("MEMBERS_MAX", "CATENARY_MEMBERS_MAX", MEMBERS_MAX as u32, "most members of the lockstep"),
     ("MEMBER_CHANGES_KEPT", "CATENARY_MEMBER_CHANGES_KEPT", MEMBER_CHANGES_KEPT as u32, "changes that a status names"),
@@ -76,6 +76,7 @@ const CONSTANTS: [(&str, &str, u32, &str); 28] = [
     ("ParticleFlags::FROZEN", "CATENARY_PARTICLE_FROZEN", ParticleFlags::FROZEN, "excluded: its state was not finite"),
     ("SnapshotFlags::PAUSED", "CATENARY_SNAPSHOT_PAUSED", SnapshotFlags::PAUSED, "the node was paused in this step"),
     ("SnapshotFlags::REPLAY", "CATENARY_SNAPSHOT_REPLAY", SnapshotFlags::REPLAY, "the writer plays a recording"),
+    ("SnapshotFlags::IN_PLACE", "CATENARY_SNAPSHOT_IN_PLACE", SnapshotFlags::IN_PLACE, "a command has put the state in place"),
     ("StatusFlags::PAUSED", "CATENARY_STATUS_PAUSED", StatusFlags::PAUSED, "the node waits for resume or step"),
     ("StatusFlags::REPLAY", "CATENARY_STATUS_REPLAY", StatusFlags::REPLAY, "the writer plays a recording"),
     ("StatusFlags::AT_END", "CATENARY_STATUS_AT_END", StatusFlags::AT_END, "the recording has ended"),

@@ -245,7 +245,11 @@ fn command_numbers() -> [Numbers; 8] {
 }
 
 fn state_numbers() -> [Numbers; 10] {
-    let snapshot = [(SnapshotFlags::PAUSED, "paused"), (SnapshotFlags::REPLAY, "replay")];
+    let snapshot = [
+        (SnapshotFlags::PAUSED, "paused"),
+        (SnapshotFlags::REPLAY, "replay"),
+        (SnapshotFlags::IN_PLACE, "in place"),
+    ];
     let status = [
         (StatusFlags::PAUSED, "paused"),
         (StatusFlags::REPLAY, "replay"),
