@@ -54,7 +54,8 @@ struct Member {
 impl Member {
     /// `begun` is the newest step whose state a command has put in place.
     fn is_awaited(&self, step: u64, begun: u64) -> bool {
-        self.ready.is_none_or(|ready| ready < begun || step >= ready + self.every)
+        let is_begun = step == begun;
+        self.ready.is_none_or(|ready| (is_begun && ready < step) || step >= ready + self.every)
     }
 }
 
@@ -291,6 +292,7 @@ mod tests {
         add(&mut lockstep, ready(7, 6, 4), 6);
         lockstep.begin_state(7);
         assert!(lockstep.is_waiting(7) && lockstep.has_begun_at(7) && !lockstep.has_begun_at(8));
+        assert!(!lockstep.is_waiting(8), "a member that was dropped there and joins again");
         add(&mut lockstep, ready(7, 7, 4), 7);
         assert!(!lockstep.is_waiting(7) && !lockstep.is_waiting(10) && lockstep.is_waiting(11));
         assert_eq!(events, [Event::Joined { client_id: 7, every: 4 }]);
