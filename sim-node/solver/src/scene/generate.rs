@@ -4,6 +4,7 @@ mod bending;
 pub(super) mod bridge;
 mod builder;
 pub(super) mod cloth;
+pub(super) mod folds;
 mod hinges;
 pub(super) mod obj;
 pub(super) mod pinned;

@@ -4,6 +4,7 @@ use serde::Serialize;
 use sim_types::ConstraintKind;
 
 use super::builder::{ConstraintBuilder, ParticleBuilder, round};
+use super::folds::Folds;
 use crate::constraints::families::Family;
 use crate::scene::definition::bending::SheetBending;
 use crate::scene::definition::decimal;
@@ -27,6 +28,9 @@ pub struct Cloth {
     /// Vector from one row to the next, in multiples of the spacing.
     #[serde(with = "decimal::vector")]
     pub down: [f32; 3],
+    /// Folds in which the sheet is gathered, if it is.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    pub folds: Option<Folds>,
     /// Kinds of constraints to create.
     pub links: Vec<ConstraintKind>,
     /// Diagonals of each cell that have a shear constraint.
@@ -76,10 +80,11 @@ impl Cloth {
     }
 
     pub(super) fn build_particles(&self, builder: &mut ParticleBuilder<'_>) {
+        let places = self.places();
         for row in 0..self.rows {
-            for column in 0..self.columns {
+            for (column, place) in (0..).zip(&places) {
                 let index = row * self.columns + column;
-                let position = self.position(column, row);
+                let position = self.position(*place, row);
                 builder.particle(position, |word| self.is_pinned(word, index));
             }
         }
@@ -129,14 +134,33 @@ impl Cloth {
         }
     }
 
-    fn position(&self, column: u32, row: u32) -> [f32; 3] {
+    /// Returns for each column its way along the sheet and out of its front, in spacings.
+    fn places(&self) -> Vec<[f64; 2]> {
+        match self.folds {
+            Some(folds) => folds.places(self.columns),
+            None => (0..self.columns).map(|column| [f64::from(column), 0.0]).collect(),
+        }
+    }
+
+    fn position(&self, [along, out]: [f64; 2], row: u32) -> [f32; 3] {
         let spacing = f64::from(self.spacing);
-        let along = |axis: usize| {
-            let right = f64::from(self.right[axis]) * f64::from(column);
+        let front = if out == 0.0 { [0.0; 3] } else { self.front() };
+        let coordinate = |axis: usize| {
+            let right = f64::from(self.right[axis]) * along;
             let down = f64::from(self.down[axis]) * f64::from(row);
-            round(f64::from(self.origin[axis]) + spacing * (right + down))
+            round(f64::from(self.origin[axis]) + spacing * (right + down + front[axis] * out))
         };
-        [along(0), along(1), along(2)]
+        [coordinate(0), coordinate(1), coordinate(2)]
+    }
+
+    /// The vector out of the front of the sheet, as long as `right`.
+    fn front(&self) -> [f64; 3] {
+        let [right, down] = [self.right, self.down].map(|one| one.map(f64::from));
+        let cross = |a: usize, b: usize| down[a] * right[b] - down[b] * right[a];
+        let normal = [cross(1, 2), cross(2, 0), cross(0, 1)];
+        let square = |one: [f64; 3]| one.iter().map(|axis| axis * axis).sum::<f64>();
+        let scale = (square(right) / square(normal)).sqrt();
+        if scale.is_finite() { normal.map(|axis| axis * scale) } else { [0.0; 3] }
     }
 
     /// Returns the constraints that start at a particle: right, down, down-right, then from its

@@ -4,13 +4,14 @@ mod fields;
 pub(super) mod file;
 mod mesh;
 
-use sim_types::{ConstraintKind, NumberRange};
+use sim_types::{ConstraintKind, ELEMENTS_MAX, NumberRange};
 
 use super::reader::Reader;
 use super::value::{Spanned, Table};
 use crate::scene::error::SceneError;
 use crate::scene::generate::bridge::Bridge;
 use crate::scene::generate::cloth::{self, Cloth, Diagonals};
+use crate::scene::generate::folds::Folds;
 use crate::scene::generate::pinned::END_WORDS;
 use crate::scene::generate::ragdoll::{self, Ragdoll};
 use crate::scene::generate::rope::Rope;
@@ -28,6 +29,10 @@ struct ShapeKeys {
     pins: &'static [&'static str],
 }
 
+/// Fullness of gathered sheets: three layers are more than any curtain has.
+const FULLNESS: NumberRange = NumberRange { min: 1.0, max: 3.0, text: "1 to 3", ..NumberRange::SHARE };
+const FULLNESS_DEFAULT: f32 = 2.0;
+
 const SHEET: &[&str] = &[
     "columns",
     "rows",
@@ -35,6 +40,8 @@ const SHEET: &[&str] = &[
     "origin",
     "right",
     "down",
+    "folds",
+    "fullness",
     "links",
     "diagonals",
     "bending",
@@ -166,10 +173,31 @@ impl GeneratorFields<'_, '_> {
             origin: self.vector_or("origin", file.origin.as_ref(), [0.0; 3])?,
             right: self.vector_or("right", file.right.as_ref(), [1.0, 0.0, 0.0])?,
             down: self.vector_or("down", file.down.as_ref(), [0.0, -1.0, 0.0])?,
+            folds: self.folds()?,
             links: self.links(default_links)?,
             diagonals: self.diagonals()?,
             bending: self.sheet_bending()?,
         })
+    }
+
+    /// Returns the folds of a sheet, if it has any.
+    fn folds(&self) -> Result<Option<Folds>, SceneError> {
+        let Self { file, reader, .. } = self;
+        let Some(folds) = &file.folds else {
+            let Some(fullness) = &file.fullness else { return Ok(None) };
+            let problem = "fullness needs folds (allowed: both or neither)";
+            return reader.error(fullness.span(), &self.name("fullness"), problem);
+        };
+        if reader.is_planar {
+            let problem = "folds need 3 dimensions (allowed: no folds)";
+            return reader.error(folds.span(), &self.name("folds"), problem);
+        }
+        let count = reader.whole(&self.name("folds"), folds, 1..=ELEMENTS_MAX)?;
+        let fullness = match &file.fullness {
+            Some(fullness) => reader.ranged(&self.name("fullness"), fullness, FULLNESS)?,
+            None => FULLNESS_DEFAULT,
+        };
+        Ok(Some(Folds { count, fullness }))
     }
 
     /// Returns the kinds of constraints in a sheet, ascending and without duplicates.

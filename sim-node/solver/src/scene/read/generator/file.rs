@@ -26,6 +26,8 @@ pub(in crate::scene::read) struct FileGenerator {
     pub(in crate::scene::read) origin: Option<Vector>,
     pub(in crate::scene::read) right: Option<Vector>,
     pub(in crate::scene::read) down: Option<Vector>,
+    pub(in crate::scene::read) folds: Option<Whole>,
+    pub(in crate::scene::read) fullness: Option<Number>,
     pub(in crate::scene::read) links: Option<Spanned<Vec<Word>>>,
     pub(in crate::scene::read) diagonals: Option<Whole>,
     pub(in crate::scene::read) bending: Option<Spanned<NumberOrPair>>,
@@ -111,7 +113,7 @@ impl FileGenerator {
     }
 
     /// Returns the places of the keys that belong to single shapes.
-    pub(in crate::scene::read) fn shape_keys(&self) -> [(&'static str, Option<Range<usize>>); 27] {
+    pub(in crate::scene::read) fn shape_keys(&self) -> [(&'static str, Option<Range<usize>>); 29] {
         fn span<T>(value: Option<&Spanned<T>>) -> Option<Range<usize>> {
             value.map(Spanned::span)
         }
@@ -122,6 +124,8 @@ impl FileGenerator {
             ("origin", span(self.origin.as_ref())),
             ("right", span(self.right.as_ref())),
             ("down", span(self.down.as_ref())),
+            ("folds", span(self.folds.as_ref())),
+            ("fullness", span(self.fullness.as_ref())),
             ("links", span(self.links.as_ref())),
             ("diagonals", span(self.diagonals.as_ref())),
             ("bending", span(self.bending.as_ref())),
