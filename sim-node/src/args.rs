@@ -35,7 +35,7 @@ pub(crate) use scene::{CheckArgs, ImportArgs, ScenesArgs, ShowArgs};
 ///
 /// The node publishes every state in shared memory, where other processes read it without copying,
 /// and accepts commands (grab, pin, pause, ...) from all of them. Without arguments, it runs the
-/// built-in scene `curtain` until Ctrl-C.
+/// built-in scene `drape` until Ctrl-C.
 #[derive(Debug, Parser)]
 #[command(
     name = "sim-node",
@@ -44,7 +44,7 @@ pub(crate) use scene::{CheckArgs, ImportArgs, ScenesArgs, ShowArgs};
         sim-node [--name NAME] [--domain DOMAIN] <COMMAND> ...",
     after_help = "Exit codes: 0 success, 1 failure, 2 usage error, 4 the node rejected a command of `ctl`.\n\n\
         Examples:\n  \
-        sim-node                                    run the curtain\n  \
+        sim-node                                    run the drape, a curtain with folds\n  \
         sim-node run rope --rate 1000               run the rope at 1 kHz\n  \
         sim-node run my.toml --duration 10s --json  run a file for 10 s, then print a summary\n  \
         sim-node ctl grab 90 0.5 0.2 0.3            drag particle 90 of the running node\n  \

@@ -17,7 +17,7 @@ fn the_demo_shows_its_progress_and_describes_the_recording_after_ctrl_c() {
     let finished = demo.interrupt();
     assert_eq!(finished.code, Some(0), "{}", finished.stderr);
     let (file, description) = finished.stdout.split_once('\n').unwrap_or_default();
-    assert!(description.contains("curtain"), "{description}");
+    assert!(description.contains("drape"), "{description}");
     assert!(std::fs::remove_file(file).is_ok(), "no recording at {file}");
 }
 

@@ -1,6 +1,7 @@
 //! The built-in scenes.
 
-const SCENES: [(&str, &str); 19] = [
+const SCENES: [(&str, &str); 20] = [
+    ("drape", include_str!("../scenes/drape.toml")),
     ("curtain", include_str!("../scenes/curtain.toml")),
     ("rope", include_str!("../scenes/rope.toml")),
     ("flag", include_str!("../scenes/flag.toml")),

@@ -52,6 +52,7 @@ fn box_area(solver: &Solver) -> f64 {
 fn every_scene_has_the_counts_of_the_tutorials() {
     // Particles, constraints, pins.
     for (name, counts) in [
+        ("drape", [1176, 6693, 49]),
         ("curtain", [168, 596, 14]),
         ("ragdoll", [15, 20, 0]),
         ("spider-web", [145, 288, 16]),
@@ -76,7 +77,7 @@ fn every_scene_has_the_counts_of_the_tutorials() {
         assert_eq!([found.particles, found.constraints, found.pins], counts, "{name}");
     }
     assert_eq!(scene("carried-cloth").anchors[0].particles.len(), 11);
-    assert_eq!(builtin::names().count(), 19);
+    assert_eq!(builtin::names().count(), 20);
 }
 
 /// Runs a scene for a number of steps and asserts that it stays finite.

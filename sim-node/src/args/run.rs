@@ -13,14 +13,14 @@ use super::value::{size, time, whole};
 
 #[derive(Debug, ClapArgs)]
 #[command(after_help = "Examples:\n  \
-    sim-node run                                              run the curtain in real time\n  \
+    sim-node run                                              run the drape in real time\n  \
     sim-node run curtain --rate 1000 --duration 10s --json    run 10 s at 1 kHz, then print a summary\n  \
     sim-node run ./my.toml --steps 5000 --as-fast-as-possible run a file without waiting\n  \
     sim-node run rope --name left --domain lab                run beside other nodes\n  \
     sim-node run --rate 1000 --realtime --cpu 3               run 1 kHz with little jitter")]
 pub(crate) struct RunArgs {
     /// Built-in scene (see `sim-node scenes`), or TOML file: a path with / or ending in .toml
-    #[arg(default_value = "curtain")]
+    #[arg(default_value = "drape")]
     pub(crate) scene: String,
     /// Steps per second, 1 to 100000 [default: the rate of the scene]
     #[arg(long, value_name = "HZ", allow_negative_numbers = true,

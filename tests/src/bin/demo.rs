@@ -21,7 +21,7 @@ const POLL: Duration = Duration::from_millis(200);
 
 /// The text of `--help`.
 const HELP: &str =
-    "Run a node with the curtain scene, a recorder and a viewer until Ctrl-C, then describe the recording.
+    "Run a node with the scene drape, a recorder and a viewer until Ctrl-C, then describe the recording.
 
 Usage: cargo demo [--bodies]
 
@@ -69,7 +69,7 @@ fn run() -> anyhow::Result<()> {
     }
     note("starting the node");
     let scene = has_bodies.then(bodies_scene).transpose()?;
-    let run = ["run", scene.as_deref().unwrap_or("curtain")];
+    let run = ["run", scene.as_deref().unwrap_or("drape")];
     let mut node = Process::start_in(Program::SimNode, &domain, &run);
     node.wait_until_ready();
     let mut bodies = has_bodies.then(|| Process::start_in(Program::Bodies, &domain, &[]));

@@ -158,7 +158,7 @@ mod tests {
         let no_file = |path: &Path| Err(format!("reads {path:?}"));
         assert_eq!(Scene::load("rope", &no_file).unwrap().name, "rope");
         let error = Scene::load("knot", &no_file).unwrap_err().to_string();
-        let expected = "there is no built-in scene 'knot' (allowed: curtain, rope,";
+        let expected = "there is no built-in scene 'knot' (allowed: drape, curtain,";
         assert!(error.starts_with(expected), "{error}");
     }
 

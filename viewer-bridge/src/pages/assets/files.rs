@@ -128,6 +128,7 @@ pub(super) const PICTURES: &[(&str, &[u8])] = pictures![
     "coiled-rope",
     "covered-bust",
     "curtain",
+    "drape",
     "drop-box",
     "drop-box-braced",
     "elastic-mesh",
