@@ -35,6 +35,11 @@ pub const BYTES_BURST_MAX: u32 = 4 << 20;
 pub const FRAMES_UNACKNOWLEDGED_MAX: u32 = 2;
 /// Frames per second: the refresh rate of common displays.
 pub const FRAMES_PER_SECOND_MAX: u32 = 60;
+/// Largest binary message in one piece, and size of the pieces of a longer one: half a second of a line of 1 Mbit/s. A
+/// multiple of four.
+pub const PART_SIZE_BYTES: usize = 64 << 10;
+/// Pieces that a page has not received. With one, the network latency would halve the rate.
+pub const PARTS_UNANSWERED_MAX: u32 = 2;
 /// Reliable messages that wait for one page. A page that lets more pile up is disconnected.
 pub const RELIABLE_QUEUED_MAX: usize = 256;
 /// Messages that wait for one Foxglove client. A new message replaces the oldest: a longer queue

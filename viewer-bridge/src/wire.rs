@@ -10,6 +10,7 @@ mod forces;
 mod frame;
 mod ghost;
 mod header;
+mod part;
 mod past;
 mod scene;
 mod selected;
@@ -25,6 +26,7 @@ pub use frame::{
 };
 pub use ghost::Ghost;
 pub use header::{KIND_VERSION, Kind, Stamp};
+pub use part::Part;
 pub use past::Past;
 pub use scene::{Scene, SceneText, ShapeText, scene_flag};
 pub use selected::{Inspected, InspectedParticle, Speeds};

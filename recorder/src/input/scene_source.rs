@@ -54,10 +54,7 @@ mod tests {
     #[test]
     fn an_unknown_scene_is_refused_with_the_known_ones_and_the_recordings() {
         let error = load_scene("knot", &Stop::default()).unwrap_err().to_string();
-        assert!(
-            error.starts_with("there is no built-in scene 'knot' (allowed: drape,"),
-            "{error}"
-        );
+        assert!(error.starts_with("there is no built-in scene 'knot' (allowed: drape,"), "{error}");
         assert!(error.ends_with("or give a recording ending in .mcap"), "{error}");
     }
 }

@@ -44,6 +44,9 @@ pub struct Hello {
     /// Format in which the page wants positions.
     #[serde(default)]
     pub format: Choice,
+    /// The page puts long messages together from their pieces.
+    #[serde(default)]
+    pub parts: bool,
 }
 
 /// A wish of a page: values of each frame besides the positions, from now on.
@@ -386,7 +389,7 @@ mod tests {
 
     #[test]
     fn optional_fields_have_defaults() {
-        let hello = Hello { protocol: 1, token: None, format: Choice::Auto };
+        let hello = Hello { protocol: 1, token: None, format: Choice::Auto, parts: false };
         let text = r#"{"type":"hello","protocol":1}"#;
         assert_eq!(FromPage::parse(text), Ok(FromPage::Hello(hello)));
         let command = Command::Step { count: 1 };

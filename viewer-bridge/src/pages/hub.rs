@@ -88,6 +88,15 @@ impl HubState {
         self.pages.retain(|_, page| page.queue.try_send(message.clone()).is_ok());
     }
 
+    /// Queues a message that is sent several times a second, for each page whose queue is not half full: a page that
+    /// receives a long scene over a slow line gets the next one.
+    fn queue_periodic(&mut self, message: &Message) {
+        self.pages.retain(|_, page| {
+            page.queue.capacity() < RELIABLE_QUEUED_MAX / 2
+                || page.queue.try_send(message.clone()).is_ok()
+        });
+    }
+
     fn queue_count(&mut self) {
         let count = text(&ToPage::Clients { count: self.pages.len() });
         self.queue(&count);
@@ -95,7 +104,10 @@ impl HubState {
 
     /// Queues a message for each page and keeps it for later ones.
     fn latch(&mut self, slot: Slot, message: Message) {
-        self.queue(&message);
+        match slot {
+            Slot::History | Slot::Recording => self.queue_periodic(&message),
+            _ => self.queue(&message),
+        }
         if slot == Slot::Scene {
             self.latched.retain(|slot, _| *slot < Slot::Scene);
         }
@@ -245,7 +257,7 @@ impl Hub {
             frames_per_second: rate.frames_per_second,
             ..*statistics
         };
-        state.queue(&Message::Binary(statistics.encode()));
+        state.queue_periodic(&Message::Binary(statistics.encode()));
     }
 
     /// Sends a message to one page, if it is still there.

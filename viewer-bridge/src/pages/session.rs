@@ -109,6 +109,9 @@ async fn greet<'a>(peer: &mut Peer, sessions: &'a Sessions) -> Result<Greeting<'
 }
 
 async fn serve_page(mut peer: Peer, sessions: &Sessions, venue: &Venue, hello: &Hello) {
+    if hello.parts {
+        peer.send_in_parts();
+    }
     let connection = venue.hub.join(hello.format);
     let membership = Membership { hub: &venue.hub, client: connection.client };
     let end = tokio::select! {

@@ -1,18 +1,22 @@
 //! The WebSocket of one client, with the limits on size, rate and silence.
 
+use std::collections::VecDeque;
 use std::time::Duration;
 
 use axum::Error;
 use axum::extract::ws::{CloseFrame, Message, WebSocket, WebSocketUpgrade};
 use bytes::Bytes;
 use sim_contract::clock::monotonic_ns;
+use tokio::task::spawn_blocking;
 use tokio::time::{Interval, MissedTickBehavior, interval, timeout};
 use tokio_tungstenite::tungstenite;
 
 use super::rate_limit::{Rate, RateLimit};
 use crate::limits::{
-    MESSAGE_SIZE_BYTES_MAX, MESSAGES_BURST_MAX, MESSAGES_PER_SECOND_MAX, PING_PERIOD, SILENCE_MAX,
+    MESSAGE_SIZE_BYTES_MAX, MESSAGES_BURST_MAX, MESSAGES_PER_SECOND_MAX, PART_SIZE_BYTES,
+    PARTS_UNANSWERED_MAX, PING_PERIOD, SILENCE_MAX,
 };
+use crate::wire::Part;
 
 /// The server ends.
 pub(crate) const GOING_AWAY: u16 = 1001;
@@ -77,6 +81,15 @@ pub(crate) struct Peer {
     rate: RateLimit,
     last_message_ns: u64,
     ping: Interval,
+    /// The client puts long messages together from their pieces.
+    takes_parts: bool,
+    /// Messages that have arrived while pieces were sent.
+    arrived: VecDeque<Message>,
+}
+
+/// The end of a client that does not even answer a ping.
+fn silent() -> End {
+    End::closed(TOO_SLOW, "the client does not answer")
 }
 
 /// Sets the limits of a WebSocket before the upgrade.
@@ -93,40 +106,108 @@ impl Peer {
         let now_ns = monotonic_ns();
         let mut ping = interval(PING_PERIOD);
         ping.set_missed_tick_behavior(MissedTickBehavior::Delay);
-        Self { socket, rate: RateLimit::new(MESSAGES, now_ns), last_message_ns: now_ns, ping }
+        Self {
+            socket,
+            rate: RateLimit::new(MESSAGES, now_ns),
+            last_message_ns: now_ns,
+            ping,
+            takes_parts: false,
+            arrived: VecDeque::new(),
+        }
+    }
+
+    /// Sends long messages in pieces from now on.
+    pub(crate) fn send_in_parts(&mut self) {
+        self.takes_parts = true;
     }
 
     /// Returns the next text or binary message, and pings the client while it waits. Dropping the
     /// future loses no message.
     pub(crate) async fn receive(&mut self) -> Result<Message, End> {
+        if let Some(message) = self.arrived.pop_front() {
+            return Ok(message);
+        }
         loop {
             tokio::select! {
                 biased;
-                incoming = self.socket.recv() => {
-                    self.last_message_ns = monotonic_ns();
-                    match incoming {
-                        None | Some(Ok(Message::Close(_))) => return Err(End::Gone),
-                        Some(Err(error)) => return Err(End::from_error(error)),
-                        Some(Ok(_)) if !self.rate.count(1, self.last_message_ns).is_zero() => {
-                            return Err(End::closed(TOO_MANY_MESSAGES, "too many messages a second"));
-                        }
-                        Some(Ok(Message::Ping(_) | Message::Pong(_))) => {}
-                        Some(Ok(message)) => return Ok(message),
+                incoming = self.socket.recv() => match self.checked(incoming)? {
+                    Message::Ping(_) | Message::Pong(_) => self.count()?,
+                    message => {
+                        self.count()?;
+                        return Ok(message);
                     }
-                }
+                },
                 _ = self.ping.tick() => {
                     let silence_ns = monotonic_ns().saturating_sub(self.last_message_ns);
                     if Duration::from_nanos(silence_ns) > SILENCE_MAX {
-                        return Err(End::closed(TOO_SLOW, "the client does not answer"));
+                        return Err(silent());
                     }
-                    self.send(Message::Ping(Bytes::new())).await?;
+                    self.send_whole(Message::Ping(Bytes::new())).await?;
                 }
             }
         }
     }
 
-    /// Sends a message. A client that does not accept it within [`SILENCE_MAX`] is given up.
+    /// Notes that something has arrived. Returns it, unless it is the end.
+    fn checked(&mut self, incoming: Option<Result<Message, Error>>) -> Result<Message, End> {
+        self.last_message_ns = monotonic_ns();
+        match incoming {
+            None | Some(Ok(Message::Close(_))) => Err(End::Gone),
+            Some(Err(error)) => Err(End::from_error(error)),
+            Some(Ok(message)) => Ok(message),
+        }
+    }
+
+    /// Counts a message that has arrived against the limit.
+    fn count(&mut self) -> Result<(), End> {
+        if self.rate.count(1, self.last_message_ns).is_zero() {
+            return Ok(());
+        }
+        Err(End::closed(TOO_MANY_MESSAGES, "too many messages a second"))
+    }
+
+    /// Sends a message, a long one in pieces if the client takes them.
     pub(crate) async fn send(&mut self, message: Message) -> Result<(), End> {
+        match message {
+            Message::Binary(bytes) if self.takes_parts && bytes.len() > PART_SIZE_BYTES => {
+                self.send_parts(bytes).await
+            }
+            message => self.send_whole(message).await,
+        }
+    }
+
+    /// Sends a message in pieces. The client's network answers the ping behind each piece once that has arrived:
+    /// however slow the line is, it is alive, and its buffers stay short.
+    async fn send_parts(&mut self, message: Bytes) -> Result<(), End> {
+        let divided = spawn_blocking(move || Part::divide(&message)).await;
+        let mut unanswered = 0;
+        for part in divided.map_err(|_| End::Gone)? {
+            self.send_whole(Message::Binary(part.encode())).await?;
+            self.send_whole(Message::Ping(Bytes::new())).await?;
+            unanswered += 1;
+            while unanswered > PARTS_UNANSWERED_MAX {
+                unanswered -= u32::from(self.is_answered().await?);
+            }
+        }
+        Ok(())
+    }
+
+    /// Waits for a message. Returns whether it answers a ping; others stay for `receive`.
+    async fn is_answered(&mut self) -> Result<bool, End> {
+        let incoming = timeout(SILENCE_MAX, self.socket.recv()).await.map_err(|_| silent())?;
+        match self.checked(incoming)? {
+            Message::Pong(_) => return Ok(true),
+            Message::Ping(_) => self.count()?,
+            message => {
+                self.count()?;
+                self.arrived.push_back(message);
+            }
+        }
+        Ok(false)
+    }
+
+    /// Sends a message. A client that does not accept it within [`SILENCE_MAX`] is given up.
+    async fn send_whole(&mut self, message: Message) -> Result<(), End> {
         match timeout(SILENCE_MAX, self.socket.send(message)).await {
             Ok(Ok(())) => Ok(()),
             Ok(Err(_)) | Err(_) => Err(End::Gone),

@@ -6,6 +6,7 @@ use super::forces::Forces;
 use super::frame::{self, Format, Frame};
 use super::ghost::Ghost;
 use super::header::{KIND_VERSION, Kind, Stamp};
+use super::part::Part;
 use super::past::Past;
 use super::scene::Scene;
 use super::selected::{Inspected, Speeds};
@@ -37,6 +38,8 @@ pub enum Message {
     Past(Past),
     /// A state of another recording.
     Ghost(Ghost),
+    /// A piece of a long message.
+    Part(Part),
 }
 
 /// Decodes one message.
@@ -76,6 +79,8 @@ pub fn decode(bytes: &[u8]) -> Result<Message, DecodeError> {
         Message::Past(Past::decode(stamp, &mut cursor)?)
     } else if is(Kind::Ghost) {
         Message::Ghost(Ghost::decode(stamp, &mut cursor)?)
+    } else if is(Kind::Part) {
+        Message::Part(Part::decode(stamp, &mut cursor)?)
     } else {
         return Err(unknown);
     };

@@ -31,6 +31,8 @@ pub enum Kind {
     Past = 11,
     /// A state of another recording.
     Ghost = 12,
+    /// A piece of a long message.
+    Part = 13,
 }
 
 /// Load and step that a message belongs to.

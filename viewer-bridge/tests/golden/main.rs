@@ -17,8 +17,8 @@ use sim_contract::{
 };
 use sim_solver::scene::ColliderMesh;
 use viewer_bridge::wire::{
-    Bounds, Colliders, Forces, Format, FrameHead, FrameLimits, Ghost, Inspected, Message, Past,
-    Percentiles, Pins, Scene, SceneText, ShapeText, Speeds, Stamp, Statistics, Tear, decode,
+    Bounds, Colliders, Forces, Format, FrameHead, FrameLimits, Ghost, Inspected, Message, Part,
+    Past, Percentiles, Pins, Scene, SceneText, ShapeText, Speeds, Stamp, Statistics, Tear, decode,
     encode_frame, frame_flag, scene_flag,
 };
 
@@ -203,7 +203,14 @@ fn messages() -> Vec<(&'static str, Vec<u8>)> {
         ("inspected", inspected().encode().to_vec()),
         ("ghost", ghost().encode().to_vec()),
         ("past", Past { stamp: STAMP, count: 4 }.encode().to_vec()),
+        ("part", part().encode().to_vec()),
     ]
+}
+
+/// The last piece of a compressed scene.
+fn part() -> Part {
+    let bytes = vec![1, 2, 3].into();
+    Part { stamp: STAMP, kind: 1, offset: 65_536, size: 65_539, unpacked_size: 200_000, bytes }
 }
 
 /// The fields that a decoder must find.
@@ -268,6 +275,11 @@ fn fields(message: &Message) -> Value {
         }),
         Message::Past(past) => json!({
             "kind": 11, "epoch": past.stamp.epoch, "step": past.stamp.step, "count": past.count,
+        }),
+        Message::Part(part) => json!({
+            "kind": 13, "epoch": part.stamp.epoch, "step": part.stamp.step, "of_kind": part.kind,
+            "offset": part.offset, "size": part.size, "unpacked_size": part.unpacked_size,
+            "bytes": part.bytes.to_vec(),
         }),
         Message::Ghost(ghost) => json!({
             "kind": 12, "epoch": ghost.stamp.epoch, "step": ghost.stamp.step,

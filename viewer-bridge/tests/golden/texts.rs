@@ -140,7 +140,7 @@ fn to_page_of_a_replay() -> Vec<ToPage> {
 
 /// One message of each kind that a page may send.
 const FROM_PAGE: [&str; 42] = [
-    r#"{"type":"hello","protocol":2,"token":"00","format":"u16"}"#,
+    r#"{"type":"hello","protocol":2,"token":"00","format":"u16","parts":true}"#,
     r#"{"type":"hello","protocol":2}"#,
     r#"{"type":"ack","frame":77}"#,
     r#"{"type":"forces","is_on":true}"#,

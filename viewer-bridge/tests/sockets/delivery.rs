@@ -3,13 +3,14 @@
 use std::time::Duration;
 
 use sim_contract::TornConstraint;
-use viewer_bridge::limits::FRAMES_UNACKNOWLEDGED_MAX;
+use sim_contract::clock::{SECOND_NS, monotonic_ns, sleep_until};
+use viewer_bridge::limits::{FRAMES_UNACKNOWLEDGED_MAX, SILENCE_MAX};
 use viewer_bridge::message::Node;
 use viewer_bridge::pages::hub::Formats;
 use viewer_bridge::request::{ClientId, Request, RequestKind};
 use viewer_bridge::sink::Update;
 use viewer_bridge::wire::Format::{F32, U16};
-use viewer_bridge::wire::{Message, frame_flag};
+use viewer_bridge::wire::{Message, Scene, frame_flag};
 
 use crate::support::{Site, wait_for};
 
@@ -61,6 +62,33 @@ fn tears_come_as_changes_and_a_reset_empties_the_list() {
     }
     let expected = [(5, 0, vec![3]), (6, 1, vec![1]), (7, 0, vec![]), (8, 0, vec![2])];
     assert_eq!(tears, expected);
+}
+
+#[test]
+fn a_page_on_a_slow_line_receives_a_scene_that_takes_longer_than_any_silence_may() {
+    let mut site = Site::start();
+    // Positions without a pattern, which hardly become smaller: two dozen pieces.
+    let noise = |index: u32| f32::from_bits(0x3f80_0000 | (index.wrapping_mul(2_654_435_761) >> 9));
+    let particle = |index: u32| [0, 1, 2].map(|axis| noise(3 * index + axis));
+    let scene = Scene { positions: (0..150_000).map(particle).collect(), ..Scene::default() };
+    site.shown.begin_load(&site.sinks, scene);
+    let mut page = site.silent_page();
+    page.send(r#"{"type":"hello","protocol":2,"parts":true}"#);
+    let begin_ns = monotonic_ns();
+    let mut bytes = Vec::new();
+    loop {
+        let Message::Part(part) = page.binary() else { continue };
+        assert_eq!((part.kind, part.offset as usize), (1, bytes.len()));
+        bytes.extend_from_slice(&part.bytes);
+        if bytes.len() == part.size as usize {
+            break;
+        }
+        sleep_until(monotonic_ns() + SECOND_NS * 6 / 10);
+    }
+    assert!(Duration::from_nanos(monotonic_ns() - begin_ns) > SILENCE_MAX);
+    // The page is still connected, and receives frames.
+    site.show(7, 1);
+    assert_eq!(page.frame().0, 7);
 }
 
 #[test]

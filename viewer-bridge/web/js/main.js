@@ -97,6 +97,7 @@ function start(renderer) {
         simulation.frameNumber = null;
       }
     },
+    onProgress: (share) => banner.set("receiving", share === null ? "" : `Receiving the scene: ${Math.floor(100 * share)} %.`),
     onFault: (text) => {
       faults.push(text);
       banner.notify(text, "error");

@@ -8,7 +8,7 @@ import { decode } from "../js/net/wire.js";
 
 const golden = JSON.parse(readFileSync(new URL("../../tests/golden/messages.json", import.meta.url), "utf8"));
 const SHAPES = ["plane", "box", "sphere", "capsule", "bounds", "mesh"];
-const KINDS = ["", "scene", "frame", "frame", "tear", "pins", "stats", "colliders", "forces", "speeds", "inspected", "past", "ghost"];
+const KINDS = ["", "scene", "frame", "frame", "tear", "pins", "stats", "colliders", "forces", "speeds", "inspected", "past", "ghost", "part"];
 const RECIPIENTS = ["collider", "anchor", "particle"];
 
 /** Decodes hex into an array buffer that starts at offset 0. */
@@ -47,6 +47,7 @@ const readers = {
   inspected: (m) => ({ particles: m.rows.map((row) => ({ particle: row.particle, position: row.position, velocity: row.velocity, inverse_mass: row.inverseMass })) }),
   ghost: (m) => ({ farthest: m.farthest, distance: m.distance, positions: triples(m.positions), hidden: [...m.hidden] }),
   past: (m) => ({ count: m.count }),
+  part: (m) => ({ of_kind: m.ofKind, offset: m.offset, size: m.size, unpacked_size: m.unpackedSize, bytes: [...m.bytes] }),
   forces: (m) => ({
     rate_hz: m.rateHz,
     rows: m.rows.map((row) => ({ kind: RECIPIENTS.indexOf(row.kind), index: row.index, impulse: row.impulse, angular_impulse: row.angularImpulse, contacts: row.contacts })),

@@ -1,6 +1,7 @@
 // The connection to the bridge: introduces the page, passes messages on, acknowledges drawn frames,
 // and reconnects with growing, randomised delays.
 
+import { Parts } from "./parts.js";
 import { decode } from "./wire.js";
 
 /** @typedef {"connecting" | "open" | "waiting" | "refused"} ConnectionState */
@@ -11,7 +12,8 @@ import { decode } from "./wire.js";
  *   onText(message: import("./messages.js").TextMessage): void,
  *   onChange(connection: Connection): void,
  *   onFault(text: string): void,
- * }} Handlers
+ *   onProgress(share: number | null): void,
+ * }} Handlers  onProgress: the share of a long scene that has arrived, null once it is there
  */
 
 export const PROTOCOL = 2;
@@ -53,6 +55,26 @@ export class Connector {
     this.failures = 0;
     this.timer = 0;
     this.framesAcknowledged = 0;
+    /** Messages behind one that is being unpacked. @type {(string | ArrayBuffer)[]} */
+    this.waiting = [];
+    this.parts = this.partsOfConnection();
+  }
+
+  /** @returns {Parts} */
+  partsOfConnection() {
+    // What an earlier connection has not completed is lost.
+    const parts = new Parts(
+      (message) => { if (parts === this.parts) this.receiveBinary(message); },
+      (share) => { if (parts === this.parts) this.handlers.onProgress(share); },
+    );
+    return parts;
+  }
+
+  /** Drops what the connection has not completed. */
+  forget() {
+    this.waiting = [];
+    this.parts = this.partsOfConnection();
+    this.handlers.onProgress(null);
   }
 
   connect() {
@@ -63,7 +85,7 @@ export class Connector {
     socket.binaryType = "arraybuffer";
     this.socket = socket;
     socket.onopen = () => this.opened();
-    socket.onmessage = ({ data }) => (typeof data === "string" ? this.receiveText(data) : this.receiveBinary(data));
+    socket.onmessage = ({ data }) => this.receive(data);
     socket.onclose = ({ code, reason }) => this.closed(socket, code, reason);
   }
 
@@ -74,18 +96,39 @@ export class Connector {
 
   opened() {
     const token = this.token === null ? {} : { token: this.token };
-    this.send({ type: "hello", protocol: PROTOCOL, ...token, format: "auto" });
+    this.send({ type: "hello", protocol: PROTOCOL, ...token, format: "auto", parts: true });
   }
 
   /** @param {WebSocket} socket @param {number} code @param {string} reason */
   closed(socket, code, reason) {
     if (socket !== this.socket) return;
     this.socket = null;
+    this.forget();
     const text = closedText(code, reason, this.token !== null);
     if (FINAL_CODES.has(code)) return this.change({ state: "refused", text });
     const delay = delayBefore(this.failures++, Math.random());
     this.timer = setTimeout(() => this.connect(), delay);
     this.change({ state: "waiting", text: `${text} Trying again…` });
+  }
+
+  /** @param {string | ArrayBuffer} data */
+  receive(data) {
+    if (this.parts.isBusy) this.waiting.push(data);
+    else if (typeof data === "string") this.receiveText(data);
+    else this.receiveBinary(data);
+  }
+
+  /** Adds a piece of a long message, and then passes on what has waited for the whole. @param {import("./wire.js").Part} part */
+  async receivePart(part) {
+    const { parts } = this;
+    try {
+      await parts.add(part);
+    } catch (error) {
+      parts.isBusy = false;
+      this.handlers.onFault(`A message could not be read: ${error}`);
+    }
+    // Another connection has its own.
+    while (parts === this.parts && !parts.isBusy && this.waiting.length > 0) this.receive(/** @type {string | ArrayBuffer} */ (this.waiting.shift()));
   }
 
   /** @param {string} data */
@@ -103,7 +146,8 @@ export class Connector {
   receiveBinary(data) {
     try {
       const message = decode(data);
-      if (message !== null) this.handlers.onBinary(message);
+      if (message?.kind === "part") void this.receivePart(message);
+      else if (message !== null) this.handlers.onBinary(message);
     } catch (error) {
       this.handlers.onFault(`A message could not be read: ${error}`);
     }

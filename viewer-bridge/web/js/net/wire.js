@@ -54,7 +54,8 @@
  * @typedef {Header & { kind: "inspected", rows: InspectedRow[] }} Inspected
  * @typedef {Header & { kind: "past", count: number }} Past
  * @typedef {Header & { kind: "ghost", positions: Float32Array, hidden: Uint32Array, farthest: number, distance: number }} Ghost  a state of another recording
- * @typedef {Scene | Frame | Tear | Pins | Stats | Colliders | Forces | Speeds | Inspected | Past | Ghost} Message
+ * @typedef {Header & { kind: "part", ofKind: number, offset: number, size: number, unpackedSize: number, bytes: Uint8Array }} Part  a piece of a long message
+ * @typedef {Scene | Frame | Tear | Pins | Stats | Colliders | Forces | Speeds | Inspected | Past | Ghost | Part} Message
  */
 
 /** Flags of a particle in PINS. */
@@ -133,6 +134,7 @@ const DECODERS = /** @type {Record<number, (reader: Reader, header: Header) => M
   10: decodeInspected,
   11: decodePast,
   12: decodeGhost,
+  13: decodePart,
 });
 
 /**
@@ -317,6 +319,12 @@ function decodeInspected(reader, header) {
   const rows = [];
   for (let row = 0; row < count; row++) rows.push({ particle: reader.u32(), position: reader.f32x3(), velocity: reader.f32x3(), inverseMass: reader.f32() });
   return { kind: "inspected", ...header, rows };
+}
+
+/** @param {Reader} reader @param {Header} header @returns {Part} */
+function decodePart(reader, header) {
+  const [ofKind, offset, size, unpackedSize, count] = [reader.u32(), reader.u32(), reader.u32(), reader.u32(), reader.u32()];
+  return { kind: "part", ...header, ofKind, offset, size, unpackedSize, bytes: reader.array(Uint8Array, count) };
 }
 
 /** @param {Reader} reader @param {Header} header @returns {Past} */

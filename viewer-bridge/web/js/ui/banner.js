@@ -9,7 +9,7 @@ const NOTICES_MAX = 3;
 const HISTORY_MAX = 100;
 
 /** Causes of a banner, most severe first. Only one is shown. */
-const ORDER = /** @type {const} */ (["fatal", "context", "connection", "node", "nonFinite", "saturated", "past", "incomplete"]);
+const ORDER = /** @type {const} */ (["fatal", "context", "connection", "receiving", "node", "nonFinite", "saturated", "past", "incomplete"]);
 
 /** @typedef {typeof ORDER[number]} Cause */
 

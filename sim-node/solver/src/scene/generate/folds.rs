@@ -46,7 +46,11 @@ impl Folds {
         let [mut low, mut high] = [0.0, STEEPNESS_MAX];
         for _ in 0..SEARCH_ROUNDS {
             let middle = f64::midpoint(low, high);
-            if width(middle) * f64::from(self.fullness) > flat { low = middle } else { high = middle }
+            if width(middle) * f64::from(self.fullness) > flat {
+                low = middle
+            } else {
+                high = middle
+            }
         }
         low
     }

@@ -30,7 +30,8 @@ struct ShapeKeys {
 }
 
 /// Fullness of gathered sheets: three layers are more than any curtain has.
-const FULLNESS: NumberRange = NumberRange { min: 1.0, max: 3.0, text: "1 to 3", ..NumberRange::SHARE };
+const FULLNESS: NumberRange =
+    NumberRange { min: 1.0, max: 3.0, text: "1 to 3", ..NumberRange::SHARE };
 const FULLNESS_DEFAULT: f32 = 2.0;
 
 const SHEET: &[&str] = &[
