@@ -70,7 +70,7 @@ test("what follows a compressed message waits until that is unpacked", async () 
   assert.deepEqual(log, [4, "reset", 5, 6]);
 });
 
-test("the progress of a scene is told, and a connection that ends takes its pieces along", async () => {
+test("the progress of a scene is reported, and a connection that ends takes its pieces along", async () => {
   const { made, log } = connector();
   const [first, second] = partsOf(past(7), 12, { ofKind: SCENE });
   made.receive(first);
