@@ -21,11 +21,15 @@ impl Incidence {
         let all = |add: &mut dyn FnMut(u32, u32)| {
             let mut number = 0;
             for ends in of_constraints() {
-                ends.into_iter().for_each(|particle| add(particle, number));
+                for particle in ends {
+                    add(particle, number);
+                }
                 number += 1;
             }
             for ends in of_bends() {
-                ends.for_each(|(particle, _)| add(particle, number));
+                for (particle, _) in ends {
+                    add(particle, number);
+                }
                 number += 1;
             }
         };
