@@ -1,7 +1,7 @@
 //! Values that belong to the process that made them.
 
 use std::sync::atomic::{AtomicU32, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -53,7 +53,7 @@ impl<T> OfProcess<T> {
     /// Calls a function with the value.
     ///
     /// # Errors
-    /// That of the function; or the value is closed, or belongs to a parent process.
+    /// That of the function; or the value is closed, incomplete, or belongs to a parent process.
     pub(crate) fn with<R>(&self, call: impl FnOnce(&mut T) -> PyResult<R>) -> PyResult<R> {
         let name = self.name;
         if self.is_foreign() {
@@ -62,7 +62,7 @@ impl<T> OfProcess<T> {
                  multiprocessing.set_start_method(\"spawn\")"
             )));
         }
-        let mut value = self.value.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut value = whole(&self.value, name)?;
         let value = value.as_mut();
         call(value.ok_or_else(|| Error::new_err(format!("this {name} is closed")))?)
     }
@@ -73,6 +73,15 @@ impl<T> OfProcess<T> {
             drop(value);
         }
     }
+}
+
+/// Locks a value. A panic of an earlier call has left it incomplete: then this is an error, in every later call.
+pub(crate) fn whole<'a, T>(value: &'a Mutex<T>, name: &str) -> PyResult<MutexGuard<'a, T>> {
+    value.lock().map_err(|_| {
+        Error::new_err(format!(
+            "a fault stopped an earlier call of this {name}, so its state is incomplete: make another one"
+        ))
+    })
 }
 
 impl<T> Drop for OfProcess<T> {

@@ -1,7 +1,7 @@
 //! The solver in this process, without a node or shared memory.
 
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 
 use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::exceptions::PyTypeError;
@@ -27,7 +27,7 @@ use crate::data::view;
 use crate::error::{Error, StateError, recording_error};
 use crate::patience::PART;
 use crate::picture::{Caption, Corners, PictureRequest, PixelSize};
-use crate::process::OfProcess;
+use crate::process::{OfProcess, whole};
 
 /// The client id of every action: that of a command in a file without one.
 const CLIENT_ID: u64 = 0;
@@ -55,9 +55,7 @@ enum SharedRunning {
 impl SharedRunning {
     fn with<R>(&self, call: impl FnOnce(&mut Running) -> PyResult<R>) -> PyResult<R> {
         match self {
-            Self::Alone(running) => {
-                call(&mut running.lock().unwrap_or_else(PoisonError::into_inner))
-            }
+            Self::Alone(running) => call(&mut whole(running, "simulation")?),
             Self::OfProcess(running) => running.with(call),
         }
     }

@@ -76,6 +76,8 @@ pub struct Solver {
     /// True if a state was put in place since the last step. The next step publishes it, and
     /// integrates nothing.
     pub(crate) is_put_in_place: bool,
+    /// A step panicked, so the state is neither that before it nor that after it.
+    pub(crate) is_poisoned: bool,
     /// Number of frozen particles, which their flags tell as well.
     pub(crate) frozen_count: u64,
     pub(crate) standing_body_steps: u64,
@@ -138,6 +140,7 @@ impl Solver {
             due: Due::ALL,
             has_new_tethers: false,
             is_put_in_place: false,
+            is_poisoned: false,
             frozen_count: 0,
             standing_body_steps: 0,
             measurement: None,
@@ -181,6 +184,7 @@ impl Solver {
     /// Makes the next step publish the initial state: particles, parameters, colliders and anchors as
     /// loaded, nothing grabbed, nothing torn.
     pub fn reset(&mut self) {
+        self.assert_whole();
         self.particles = new_particles(&self.model, &self.scene_anchors);
         self.parameters.clone_from(&self.initial_parameters);
         self.torn.clear();
@@ -201,6 +205,13 @@ impl Solver {
     /// steps in real time calls it after the commands; otherwise the next step does, and then may
     /// allocate.
     pub fn finish_boundary(&mut self) {
+        self.assert_whole();
+        self.is_poisoned = true;
+        self.update_derived();
+        self.is_poisoned = false;
+    }
+
+    fn update_derived(&mut self) {
         let Due { constraints, tethers } = std::mem::take(&mut self.due);
         if constraints {
             self.configure();
@@ -216,6 +227,15 @@ impl Solver {
             let measured = Measured { model: &self.model, states, tethers: &self.tethers };
             measurement.locate(&mut self.store, &measured);
         }
+    }
+
+    /// Refuses to go on with an incomplete state. Whatever the solver computed from it would be wrong.
+    #[track_caller]
+    pub(crate) fn assert_whole(&self) {
+        assert!(
+            !self.is_poisoned,
+            "a step of this solver panicked, so its state is incomplete: make another solver from the scene"
+        );
     }
 
     /// Derives the constraints from the parameters.
@@ -302,7 +322,7 @@ impl Solver {
 
     /// Basis of the tethers in the current state.
     pub(crate) fn tether_basis(&self) -> TetherBasis {
-        TetherBasis::new(&self.particles, self.torn())
+        TetherBasis::new(&self.particles, self.torn.order())
     }
 
     /// Basis of the tethers in the initial state.
@@ -324,6 +344,7 @@ impl Solver {
 
     /// Properties against which parameters and poses are checked.
     pub(crate) fn context(&self) -> Context<'_> {
+        self.assert_whole();
         let size = StepSize {
             particles: self.particle_count() as u64,
             constraints: (self.constraint_count() + self.bend_count()) as u64,
@@ -364,24 +385,28 @@ impl Solver {
 
     /// Returns the number of steps since the scene was loaded or reset.
     pub fn scene_step(&self) -> u64 {
+        self.assert_whole();
         self.scene_step
     }
 
     /// Returns the hash of the state after the last step. Equal states have equal hashes on every
     /// machine.
     pub fn state_hash(&self) -> u64 {
+        self.assert_whole();
         self.state_hash
     }
 
     /// Returns the number of frozen particles, whose state was not finite. A frozen particle stays in
     /// place until a reset, or a restore of a state in which it is not frozen.
     pub fn frozen_count(&self) -> u64 {
+        self.assert_whole();
         self.frozen_count
     }
 
     /// Returns the number of times that a search for contacts of particles was given up because there were
     /// too many of them: 8 for each particle, on average. Further contacts are ignored then.
     pub fn contact_overflow_count(&self) -> u64 {
+        self.assert_whole();
         self.particle_contacts.overflow_count
     }
 
@@ -392,6 +417,7 @@ impl Solver {
 
     /// Returns the particles after the last step, as they are published and hashed.
     pub fn particles(&self) -> &[Particle] {
+        self.assert_whole();
         &self.particles.states
     }
 
@@ -400,6 +426,7 @@ impl Solver {
     /// # Panics
     /// If `index` is out of range.
     pub fn particle(&self, index: usize) -> Particle {
+        self.assert_whole();
         self.particles.states[index]
     }
 
@@ -430,27 +457,32 @@ impl Solver {
 
     /// Returns the torn constraints, by step and then by index.
     pub fn torn(&self) -> &[u32] {
+        self.assert_whole();
         self.torn.order()
     }
 
     /// Returns the cause of each tear in [`Self::torn`].
     pub fn tear_causes(&self) -> &[TearCause] {
+        self.assert_whole();
         self.torn.causes()
     }
 
     /// Returns the number of entries at the end of [`Self::torn`] that the last step added.
     pub fn new_torn_count(&self) -> usize {
+        self.assert_whole();
         self.torn.new_count()
     }
 
     /// Returns the current parameters. The pace belongs to the node, so the time scale is always that
     /// of real time.
     pub fn parameter_values(&self) -> ParameterValues {
+        self.assert_whole();
         self.parameters.values(self.settings.method)
     }
 
     /// Returns the grabbed particles in ascending order, each with the client that holds it.
     pub fn grabs(&self) -> impl ExactSizeIterator<Item = (u32, u64)> + '_ {
+        self.assert_whole();
         self.grabs.iter().map(|grab| (grab.particle, grab.client_id))
     }
 
@@ -466,6 +498,7 @@ impl Solver {
 
     /// Returns the colliders at their poses after the last step, in the order of the scene.
     pub fn colliders(&self) -> impl Iterator<Item = PlacedCollider> + '_ {
+        self.assert_whole();
         self.colliders.iter().map(Collider::placed)
     }
 
@@ -487,6 +520,7 @@ impl Solver {
 
     /// Returns the forces of the last step, if they are computed: all 0 in a step that put a state in place.
     pub fn forces(&self) -> Option<&Forces> {
+        self.assert_whole();
         self.measurement.as_ref().map(|measurement| &measurement.forces)
     }
 
@@ -498,11 +532,13 @@ impl Solver {
     /// Returns the number of steps in which a body stood because it had no command, after its first one, summed
     /// over the bodies.
     pub fn standing_body_steps(&self) -> u64 {
+        self.assert_whole();
         self.standing_body_steps
     }
 
     /// Returns true if the last step moved a collider.
     pub fn has_moving_colliders(&self) -> bool {
+        self.assert_whole();
         self.colliders.iter().any(Collider::is_moving)
     }
 }

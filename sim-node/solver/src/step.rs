@@ -33,6 +33,9 @@ impl Solver {
     /// Makes one step of 1/rate seconds. After a state was put in place, by a reset or another command, it
     /// publishes that state instead.
     ///
+    /// A fault of the solver, which panics, leaves an incomplete state. Every later call that reads or changes the state
+    /// panics then and says so.
+    ///
     /// Position based dynamics in small steps (Macklin et al. 2019) on positions and explicit
     /// velocities: a substep works on the displacement d = h v beside the position, so that
     /// gravity survives where h^2 g is below the resolution of the position.
@@ -49,14 +52,17 @@ impl Solver {
     #[must_use]
     pub fn step_unless(&mut self, stop: &AtomicBool) -> bool {
         self.finish_boundary();
+        // A panic leaves it set.
+        self.is_poisoned = true;
         self.has_new_tethers = false;
-        if self.is_put_in_place {
+        let is_made = if self.is_put_in_place {
             self.publish_put_in_place();
-            return true;
-        }
-        self.store.with_workers().0.begin_step();
-        let is_made = self.make_step(stop);
-        self.store.with_workers().0.end_step();
+            true
+        } else {
+            let _running = self.store.with_workers().0.begin_step();
+            self.make_step(stop)
+        };
+        self.is_poisoned = false;
         is_made
     }
 
@@ -270,4 +276,59 @@ impl Solver {
 /// max(0, 1 - c h).
 fn kept_fraction(damping: f32) -> f32 {
     if damping < 1.0 { 1.0 - damping } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Calls after a panic within a step.
+    use std::panic::{AssertUnwindSafe, catch_unwind};
+
+    use sim_types::Action;
+
+    use super::*;
+    use crate::commands::cut::Sphere;
+    use crate::scene::Scene;
+
+    type Call = fn(&mut Solver) -> String;
+
+    /// Calls that read or change the state.
+    const CALLS: [(&str, Call); 17] = [
+        ("step", |solver| format!("{:?}", solver.step())),
+        ("finish_boundary", |solver| format!("{:?}", solver.finish_boundary())),
+        ("reset", |solver| format!("{:?}", solver.reset())),
+        ("apply", |solver| format!("{:?}", solver.apply(1, &Action::Pause))),
+        ("pin", |solver| format!("{:?}", solver.pin(0))),
+        ("cut", |solver| format!("{:?}", solver.cut(0))),
+        ("cut_radius", |solver| {
+            format!("{:?}", solver.cut_radius(Sphere { center: [0.0; 3], radius: 1.0 }))
+        }),
+        ("set_block_bending", |solver| format!("{:?}", solver.set_block_bending(0, 1.0))),
+        ("put_motion_in_place", |solver| format!("{:?}", solver.put_motion_in_place(&[]))),
+        ("keyframe", |solver| format!("{:?}", solver.keyframe())),
+        ("particles", |solver| format!("{:?}", solver.particles())),
+        ("particle", |solver| format!("{:?}", solver.particle(0))),
+        ("state_hash", |solver| format!("{:?}", solver.state_hash())),
+        ("hash_in_place", |solver| format!("{:?}", solver.hash_in_place())),
+        ("torn", |solver| format!("{:?}", solver.torn())),
+        ("colliders", |solver| format!("{:?}", solver.colliders().count())),
+        ("grabs", |solver| format!("{:?}", solver.grabs().count())),
+    ];
+
+    #[test]
+    fn every_call_after_a_step_that_panicked_says_so() {
+        let cloth =
+            "version = 1\n[[generate]]\nshape = \"cloth\"\ncolumns = 9\nrows = 9\nspacing = 0.1\n";
+        let mut solver = Solver::new(&Scene::from_toml(cloth, "test").unwrap());
+        solver.step();
+        // A fault: the store has one particle more.
+        let last = solver.particles.states.pop().unwrap();
+        assert!(catch_unwind(AssertUnwindSafe(|| solver.step())).is_err());
+        solver.particles.states.push(last);
+        for (name, call) in CALLS {
+            let panic = catch_unwind(AssertUnwindSafe(|| call(&mut solver)));
+            let panic = panic.expect_err(name).downcast::<&str>().unwrap();
+            assert!(panic.starts_with("a step of this solver panicked"), "{name}: {panic}");
+        }
+        assert_eq!(solver.particle_count(), 81, "what the scene tells stays");
+    }
 }

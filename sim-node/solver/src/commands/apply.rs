@@ -63,6 +63,7 @@ impl Solver {
     /// # Errors
     /// The action is wrong or has no effect here. A rejected action changes no bit of the state.
     pub fn apply(&mut self, client_id: u64, action: &Action) -> Result<Applied, Reason> {
+        self.assert_whole();
         if client_id >= CLIENT_ID_END {
             return Err(Reason::OutOfRange);
         }

@@ -35,6 +35,7 @@ impl Solver {
     /// # Errors
     /// The constraint is unknown or already torn.
     pub fn cut(&mut self, constraint: u32) -> Result<(), Reason> {
+        self.assert_whole();
         if constraint as usize >= self.constraint_count() {
             return Err(Reason::UnknownConstraint);
         }
@@ -62,6 +63,7 @@ impl Solver {
     /// # Errors
     /// A number is not finite or out of range, or the direction is 0.
     pub fn cut_segment(&mut self, sweep: Sweep) -> Result<(), Reason> {
+        self.assert_whole();
         let Sweep { from, to, direction } = sweep;
         for vector in [from, to, direction] {
             check_finite(&vector)?;
@@ -77,6 +79,7 @@ impl Solver {
     }
 
     pub(crate) fn check_sphere(&self, sphere: &Sphere) -> Result<(), Reason> {
+        self.assert_whole();
         check_finite(&sphere.center)?;
         check_finite(&[sphere.radius])?;
         let is_near = is_near(&sphere.center);

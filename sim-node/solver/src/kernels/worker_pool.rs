@@ -101,20 +101,16 @@ impl WorkerPool {
         self.others.len() + 1
     }
 
-    /// Wakes the workers and keeps them awake until [`Self::end_step`]. Does nothing if the step before had no jobs, or
-    /// if there are more workers than processors.
-    pub(crate) fn begin_step(&mut self) {
+    /// Wakes the workers and keeps them awake until the result is dropped. Does nothing if the step before had no jobs,
+    /// or if there are more workers than processors.
+    pub(crate) fn begin_step(&mut self) -> RunningStep {
         let job_count = self.slot.job_count.load(Ordering::Relaxed);
         let had_jobs = std::mem::replace(&mut self.jobs_before, job_count) != job_count;
         if had_jobs && !self.is_crowded {
             self.slot.is_stepping.store(true, Ordering::SeqCst);
             self.wake();
         }
-    }
-
-    /// Lets the workers park.
-    pub(crate) fn end_step(&mut self) {
-        self.slot.is_stepping.store(false, Ordering::Relaxed);
+        RunningStep(Arc::clone(&self.slot))
     }
 
     /// Wakes the workers that are parked.
@@ -167,13 +163,19 @@ impl WorkerPool {
         // SAFETY: every worker has finished.
         unsafe { *slot.job.0.get() = None };
         let has_panicked = slot.has_panicked.load(Ordering::Relaxed);
-        if has_panicked || result.is_err() {
-            self.end_step();
-        }
         if let Err(panic) = result {
             std::panic::resume_unwind(panic);
         }
         assert!(!has_panicked, "a thread of the solver has panicked");
+    }
+}
+
+/// A step whose workers stay awake. They park when it is dropped, after a panic as well.
+pub(crate) struct RunningStep(Arc<JobSlot>);
+
+impl Drop for RunningStep {
+    fn drop(&mut self) {
+        self.0.is_stepping.store(false, Ordering::Relaxed);
     }
 }
 
@@ -361,14 +363,14 @@ mod tests {
         let mut pool = WorkerPool::new(2);
         pool.is_crowded = false;
         let is_parked = |pool: &WorkerPool| pool.slot.is_parked[0].load(Ordering::SeqCst);
-        pool.begin_step();
+        let step = pool.begin_step();
         assert!(!pool.slot.is_stepping.load(Ordering::SeqCst), "there was no job yet");
         pool.for_each(&mut [0, 1], |part| *part += 1);
-        pool.end_step();
+        drop(step);
         while !is_parked(&pool) {
             thread::yield_now();
         }
-        pool.begin_step();
+        let step = pool.begin_step();
         // It wakes without a job.
         while is_parked(&pool) {
             thread::yield_now();
@@ -376,7 +378,7 @@ mod tests {
         let mut parts = [0, 1];
         pool.for_each(&mut parts, |part| *part += 1);
         assert_eq!(parts, [1, 2]);
-        pool.end_step();
+        drop(step);
         while !is_parked(&pool) {
             thread::yield_now();
         }
@@ -397,6 +399,19 @@ mod tests {
             });
         }));
         assert!(result.is_err());
+    }
+
+    #[test]
+    fn a_step_that_panics_between_two_jobs_lets_its_workers_park() {
+        let mut pool = WorkerPool::new(2);
+        pool.is_crowded = false;
+        pool.for_each(&mut [0, 1], |part| *part += 1);
+        let result = catch_unwind(AssertUnwindSafe(|| {
+            let _step = pool.begin_step();
+            assert!(!pool.slot.is_stepping.load(Ordering::SeqCst), "between two jobs");
+        }));
+        assert!(result.is_err());
+        assert!(!pool.slot.is_stepping.load(Ordering::SeqCst));
     }
 
     #[test]

@@ -193,6 +193,7 @@ impl Solver {
     /// Returns the state beside the particles after the last step. Call it at a boundary, before any
     /// command.
     pub fn keyframe(&self) -> Keyframe {
+        self.assert_whole();
         let fixed = (0_u32..)
             .zip(&self.particles.base_inverse_masses)
             .filter(|(particle, _)| self.is_fixed(*particle))

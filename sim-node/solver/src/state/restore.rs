@@ -128,6 +128,7 @@ impl Solver {
 
     /// Returns the hash of the state that was put in place, before the step that publishes it.
     pub fn hash_in_place(&self) -> u64 {
+        self.assert_whole();
         state_hash(&self.particles.states, self.torn.next_hash_seed())
     }
 }

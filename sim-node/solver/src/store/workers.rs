@@ -5,7 +5,7 @@ use crate::constraints::projection_block::ProjectionBlock;
 use crate::contacts::contact::reaction::{ReactionRoom, Reactions};
 use crate::contacts::contact::{ContactRoom, Contacts};
 use crate::kernels::Kernels;
-use crate::kernels::worker_pool::{WORKERS_MAX, WorkerPool};
+use crate::kernels::worker_pool::{RunningStep, WORKERS_MAX, WorkerPool};
 
 /// The threads, the kernels that they run, and the scratch memory of each.
 #[derive(Debug, Clone)]
@@ -35,14 +35,9 @@ impl Workers {
         self.pool.worker_count()
     }
 
-    /// Prepares for the jobs of a step.
-    pub(crate) fn begin_step(&mut self) {
-        self.pool.begin_step();
-    }
-
-    /// Lets the threads rest until the next step.
-    pub(crate) fn end_step(&mut self) {
-        self.pool.end_step();
+    /// Prepares for the jobs of a step, which ends when the result is dropped.
+    pub(crate) fn begin_step(&mut self) -> RunningStep {
+        self.pool.begin_step()
     }
 
     /// Number of items per part when `count` items are divided among the workers. No part but the last one is shorter

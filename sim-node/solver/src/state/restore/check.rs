@@ -60,6 +60,7 @@ impl Solver {
     }
 
     fn check_count(&self, particles: &[Particle]) -> Result<(), RestoreError> {
+        self.assert_whole();
         let (expected, found) = (self.particle_count(), particles.len());
         if expected == found {
             Ok(())
