@@ -4,7 +4,7 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
-use sim_solver::{Grab, ParameterValue, Scene, Solver, builtin};
+use sim_solver::{BodyMotion, Grab, ParameterValue, Pose, Scene, Solver, builtin};
 
 struct Counting;
 
@@ -33,6 +33,36 @@ unsafe impl GlobalAlloc for Counting {
 
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
+
+/// A cloth that tears, among colliders that move by themselves, by commands, and as bodies.
+const TEARING: &str = r#"
+version = 1
+[solver]
+tethers = true
+tear_force = 3
+[[generate]]
+shape = "cloth"
+columns = 20
+rows = 20
+spacing = 0.05
+mass = 0.05
+pinned = "top"
+[[collider]]
+shape = "box"
+center = [0.5, -0.5, 0.2]
+half_extents = [0.2, 0.2, 0.1]
+velocity = [0, 0, -0.3]
+angular_velocity = [0, 1, 0]
+[[collider]]
+shape = "sphere"
+center = [0.3, -0.3, -0.4]
+radius = 0.2
+[[collider]]
+shape = "sphere"
+center = [0.7, -0.6, -0.4]
+radius = 0.2
+body = { mass = 1, inertia = [0.02, 0.02, 0.02] }
+"#;
 
 #[test]
 fn neither_steps_nor_commands_allocate() {
@@ -73,6 +103,23 @@ fn neither_steps_nor_commands_allocate() {
         assert_eq!(allocations() - before, 0);
         assert!(solver.torn().len() > 100, "{} tore", solver.torn().len());
     }
+    // Nor does a step with everything that a node reads after it: forces, colliders that move, and tears that drop tethers.
+    let mut solver = Solver::new(&Scene::from_toml(TEARING, "test").unwrap());
+    solver.compute_forces(true);
+    solver.step();
+    let before = allocations();
+    for round in 0..200_u8 {
+        let translation = [0.0, 0.0, f32::from(round) * 0.002];
+        let pose = Pose { translation, rotation: [0.0, 0.0, 0.0, 1.0] };
+        solver.move_collider(1, pose).unwrap();
+        solver.drive_body(2, pose, &BodyMotion::default()).unwrap();
+        solver.step();
+        let moving = solver.colliders().filter(|one| one.velocity != [0.0; 3]).count();
+        assert!(moving >= 2 && solver.has_moving_colliders());
+        assert!(solver.forces().is_some());
+    }
+    assert_eq!(allocations() - before, 0);
+    assert!(solver.torn().len() > 100, "{} tore", solver.torn().len());
     // The counter works.
     drop(std::hint::black_box(vec![0_u8; 100]));
     assert!(allocations() > before);

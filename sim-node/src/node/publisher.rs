@@ -11,12 +11,12 @@ use anyhow::Context;
 use bytemuck::cast_slice;
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{
-    CONTRACT_VERSION, CollidersHeader, Command, ConnectionId, Endpoint, ForcesHeader,
-    KeyframeHeader, LoadPreparer, OUTCOME_FLAG_DISCONNECTED, Outcome, Owner, OwnerError,
-    ParameterValues, ParticleState, Ready, Reason, ReceivedCommand, SnapshotFlags, SnapshotHeader,
-    TearsHeader, TornConstraint, Wake,
+    CONTRACT_VERSION, ColliderState, CollidersHeader, Command, ConnectionId, Endpoint,
+    ForcesHeader, KeyframeHeader, LoadPreparer, OUTCOME_FLAG_DISCONNECTED, Outcome, Owner,
+    OwnerError, ParameterValues, ParticleState, Ready, Reason, ReceivedCommand, SnapshotFlags,
+    SnapshotHeader, TearsHeader, TornConstraint, Wake,
 };
-use sim_solver::{Applied, PlacedCollider, SOLVER_VERSION, Scene, Solver};
+use sim_solver::{Applied, SOLVER_VERSION, Scene, Solver};
 
 use super::inbox::Given;
 use super::statistics::phases::{Phase, Phases};
@@ -89,14 +89,15 @@ pub(crate) struct Publisher {
     rejected_count: u64,
     /// Last published parameters.
     parameters: ParameterValues,
-    /// Number of torn constraints, and the colliders, as last published.
-    torn_count: usize,
+    /// All torn constraints as last published, with room for every constraint of the load.
+    torn: Vec<TornConstraint>,
     /// First step of the last load, or step of the last complete state that a command put in place. The
     /// torn constraints of the state count as torn in it.
     since_step: u64,
     /// A step whose snapshot is published, whatever `every` says.
     included_step: u64,
-    colliders: Vec<PlacedCollider>,
+    /// The colliders as last published, with room for all of the load.
+    colliders: Vec<ColliderState>,
     forces: ForcesPublisher,
     /// Times of the phases of steps, for `bench`.
     pub(crate) phases: Phases,
@@ -137,10 +138,10 @@ impl Publisher {
             outcome_count: 0,
             rejected_count: 0,
             parameters,
-            torn_count: 0,
+            torn: Vec::with_capacity(solver.constraint_count()),
             since_step: 0,
             included_step: 0,
-            colliders: Vec::new(),
+            colliders: Vec::with_capacity(solver.collider_count()),
             forces: ForcesPublisher::default(),
             phases: Phases::default(),
         })
@@ -305,26 +306,32 @@ impl Publisher {
 
     /// Publishes the colliders if they differ from the last published ones.
     fn publish_colliders(&mut self, solver: &Solver, step: u64) -> anyhow::Result<()> {
-        if solver.colliders().eq(self.colliders.iter().copied()) {
+        let states = || solver.colliders().map(|collider| to_collider_state(&collider));
+        if states().eq(self.colliders.iter().copied()) {
             return Ok(());
         }
         self.colliders.clear();
-        self.colliders.extend(solver.colliders());
-        let states: Vec<_> = self.colliders.iter().map(to_collider_state).collect();
+        self.colliders.extend(states());
         let header = CollidersHeader { run_id: self.run_id, step, ..CollidersHeader::default() };
-        self.owner.publish_colliders(header, &states)?;
+        self.owner.publish_colliders(header, &self.colliders)?;
         Ok(())
     }
 
-    /// Publishes all torn constraints if a constraint tore or was restored in this step.
+    /// Publishes all torn constraints if a constraint tore or was restored in this step. Only the new ones are added to the
+    /// list, unless a command put another state in place.
     fn publish_tears(&mut self, solver: &Solver, step: u64) -> anyhow::Result<()> {
         let (torn, new_count) = (solver.torn(), solver.new_torn_count());
-        let is_same_list = torn.len() == self.torn_count && step != self.since_step;
-        let are_none = torn.is_empty() && self.torn_count == 0;
+        let is_continued = step != self.since_step;
+        let is_same_list = torn.len() == self.torn.len() && is_continued;
+        let are_none = torn.is_empty() && self.torn.is_empty();
         if new_count == 0 && (is_same_list || are_none) {
             return Ok(());
         }
-        self.torn_count = torn.len();
+        // Those before the new ones are the published ones.
+        let kept_count = if is_continued { torn.len() - new_count } else { 0 };
+        self.torn.truncate(kept_count);
+        let pairs = torn.iter().zip(solver.tear_causes()).skip(self.torn.len());
+        self.torn.extend(pairs.map(|(one, cause)| TornConstraint::new(*one, Some(*cause))));
         let header = TearsHeader {
             run_id: self.run_id,
             step,
@@ -332,12 +339,7 @@ impl Publisher {
             new_count: count(new_count),
             ..TearsHeader::default()
         };
-        let torn: Vec<_> = torn
-            .iter()
-            .zip(solver.tear_causes())
-            .map(|(constraint, cause)| TornConstraint::new(*constraint, Some(*cause)))
-            .collect();
-        self.owner.publish_tears(header, &torn)?;
+        self.owner.publish_tears(header, &self.torn)?;
         self.owner.wake(Wake::Tears);
         Ok(())
     }
@@ -502,4 +504,65 @@ fn parameter_values(solver: &Solver, time_scale: f64) -> ParameterValues {
 fn time_of_step_ns(step: u64, rate_hz: u32) -> u64 {
     let rate_hz = u64::from(rate_hz);
     step / rate_hz * SECOND_NS + step % rate_hz * SECOND_NS / rate_hz
+}
+
+#[cfg(test)]
+mod tests {
+    //! The lists that steps publish, and the memory that they take.
+    use std::time::Duration;
+
+    use sim_contract::{Client, ScratchDomain};
+    use sim_solver::ParameterValue;
+
+    use super::*;
+
+    /// A cloth that tears from its border on, beside a ball that moves.
+    const SCENE: &str = "version = 1\n[solver]\ntear_force = 3\n[[generate]]\nshape = \"cloth\"\ncolumns = 12\n\
+         rows = 12\nspacing = 0.05\nmass = 0.05\npinned = \"top\"\n[[collider]]\nshape = \"sphere\"\n\
+         center = [0.3, -0.3, 0.5]\nradius = 0.2\nvelocity = [0, 0, -0.5]\n";
+
+    /// The elements of a list, and where they are.
+    fn memory<T>(list: &Vec<T>) -> (*const T, usize) {
+        (list.as_ptr(), list.capacity())
+    }
+
+    fn pairs(solver: &Solver) -> Vec<TornConstraint> {
+        let pairs = solver.torn().iter().zip(solver.tear_causes());
+        pairs.map(|(one, cause)| TornConstraint::new(*one, Some(*cause))).collect()
+    }
+
+    #[test]
+    fn steps_with_tears_and_moving_colliders_take_no_memory_and_publish_every_tear() {
+        let domain = ScratchDomain::new("tears");
+        let endpoint = domain.endpoint();
+        let scene = Scene::from_toml(SCENE, "test").unwrap();
+        let mut solver = Solver::new(&scene);
+        let mut publisher = Publisher::new(&endpoint, &scene, &solver, 1).unwrap();
+        let before = (memory(&publisher.torn), memory(&publisher.colliders));
+        let (mut client, mut lists) = (Client::attach(&endpoint).unwrap(), 0);
+        let mut step_on = |solver: &mut Solver, publisher: &mut Publisher, step: u64| {
+            solver.step();
+            let is_in_place = step == 101;
+            let position =
+                Position { step, is_paused: false, is_in_place, time_scale: 1.0, is_last: false };
+            publisher.publish_step(solver, position, StepTimes::default()).unwrap();
+            lists += u64::from(solver.new_torn_count() > 0);
+            let torn = client.torn(Duration::from_secs(10)).unwrap();
+            assert_eq!(torn.constraints, pairs(solver), "step {step}");
+            assert_eq!(publisher.colliders.len(), 1);
+        };
+        for step in 1..=100 {
+            step_on(&mut solver, &mut publisher, step);
+        }
+        assert!(solver.torn().len() > 100, "{} tore", solver.torn().len());
+        // A reset empties the list, and others tear after it.
+        solver.reset();
+        publisher.add_outcome(101, Command::default(), Ok(Applied::InPlace));
+        solver.set("tear_force", ParameterValue::Number(2.0), None).unwrap();
+        for step in 101..=150 {
+            step_on(&mut solver, &mut publisher, step);
+        }
+        assert!(lists > 10, "{lists} steps with tears");
+        assert_eq!((memory(&publisher.torn), memory(&publisher.colliders)), before);
+    }
 }

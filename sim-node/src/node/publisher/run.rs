@@ -58,9 +58,9 @@ impl Publisher {
         self.scene_hash = messages.scene_hash();
         self.parameters = parameters;
         self.topology_revision = topology_revision;
-        self.torn_count = 0;
+        self.torn = Vec::with_capacity(solver.constraint_count());
         self.since_step = step;
-        self.colliders.clear();
+        self.colliders = Vec::with_capacity(solver.collider_count());
         Ok(replaced)
     }
 
