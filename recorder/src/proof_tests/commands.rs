@@ -300,6 +300,10 @@ fn wrong_values_are_rejected_with_their_reason_and_change_nothing() {
             "out_of_range",
         ),
         (
+            r#""kind":"drive_body","collider":3,"translation":[0,0,0],"torque":[0,0,1e30]"#,
+            "out_of_range",
+        ),
+        (
             r#""kind":"drive_body","collider":3,"translation":[0,0,0],"torque":["nan",0,0]"#,
             "non_finite",
         ),

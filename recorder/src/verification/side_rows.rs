@@ -7,7 +7,8 @@ use crate::log::{
     TearsRow,
 };
 use sim_contract::{
-    ForceKind, ForceRow, ParameterValue, ParameterValues, ParticleFlags, ParticleState, Setting,
+    ConstraintKind, ForceKind, ForceRow, Parameter, ParameterValue, ParameterValues, ParticleFlags,
+    ParticleState, Setting,
 };
 use sim_solver::{Keyframe, Solver};
 
@@ -225,7 +226,8 @@ fn compare_keyframe(bytes: &[u8], solver: &Solver) -> Option<String> {
     let mut simulated = solver.keyframe();
     // The solver does not know whether the node was paused.
     simulated.paused = recorded.paused;
-    (recorded != simulated).then(|| {
+    // Their bytes, because a number that is not finite differs from itself.
+    (simulated.encode() != bytes).then(|| {
         "its message on /keyframe has another state: the masses, grabs, parameters, torn constraints, or moved \
          anchors or colliders differ"
             .to_owned()
@@ -261,7 +263,9 @@ fn compare_parameters(recorded: &ParametersRow, solver: &Solver) -> Option<Strin
     let time_scale = recorded.values.time_scale;
     let simulated = ParameterValues { time_scale, ..solver.parameter_values() };
     let (old, new) = (recorded.values.settings(), simulated.settings());
-    let place = (0..old.len().max(new.len())).find(|place| old.get(*place) != new.get(*place))?;
+    let differs =
+        |place: &usize| old.get(*place).map(setting_bits) != new.get(*place).map(setting_bits);
+    let place = (0..old.len().max(new.len())).find(differs)?;
     let setting = old.get(place).or_else(|| new.get(place))?;
     let block = setting.block.map_or_else(String::new, |block| format!(" of block {block}"));
     let value = |settings: &[Setting]| {
@@ -269,6 +273,19 @@ fn compare_parameters(recorded: &ParametersRow, solver: &Solver) -> Option<Strin
     };
     let (name, old, new) = (setting.parameter.name(), value(&old), value(&new));
     Some(format!("/parameters: parameter {name}{block}: recorded {old}, simulated {new}"))
+}
+
+/// The parameter, the constraints to which it applies, and the bits of its value.
+fn setting_bits(
+    setting: &Setting,
+) -> (Parameter, Option<ConstraintKind>, Option<u32>, [Option<u32>; 3]) {
+    let Setting { parameter, constraint_kind, block, value } = *setting;
+    let bits = match value {
+        ParameterValue::Number(number) => [Some(number.to_bits()), None, None],
+        ParameterValue::Vector(vector) => vector.map(|axis| Some(axis.to_bits())),
+        ParameterValue::Off => [None; 3],
+    };
+    (parameter, constraint_kind, block, bits)
 }
 
 fn value_text(value: ParameterValue) -> String {

@@ -203,7 +203,8 @@ impl Solver {
     /// the step it stands where it came.
     ///
     /// # Errors
-    /// The collider is unknown or no body, or a number is not finite or out of range.
+    /// The collider is unknown or no body, a number is not finite or out of range, or the force or torque alone would
+    /// give the body a velocity out of range within the step.
     pub fn drive_body(
         &mut self,
         collider: u32,
@@ -212,8 +213,9 @@ impl Solver {
     ) -> Result<(), Reason> {
         let frame = Frame::check(&pose, self.context())?;
         motion.check(self.is_planar)?;
+        let dt = self.step_length();
         let driven = self.colliders.get_mut(collider as usize);
-        driven.ok_or(Reason::UnknownCollider)?.drive(frame, motion)
+        driven.ok_or(Reason::UnknownCollider)?.drive(frame, motion, dt)
     }
 
     /// Sets a parameter, one of [`crate::PARAMETERS`], from the next step on. `kind` selects the
@@ -268,6 +270,7 @@ impl Solver {
     }
 
     fn find_unfrozen(&self, particle: u32) -> Result<usize, Reason> {
+        self.assert_whole();
         let index = particle as usize;
         if index >= self.particle_count() {
             return Err(Reason::UnknownParticle);

@@ -95,12 +95,21 @@ impl Collider {
         Ok(())
     }
 
-    /// Drives its body in the next step, from a frame.
-    pub(crate) fn drive(&mut self, frame: Frame, motion: &BodyMotion) -> Result<(), Reason> {
+    /// Drives its body in the next step, which takes `dt` seconds, from a frame.
+    pub(crate) fn drive(
+        &mut self,
+        frame: Frame,
+        motion: &BodyMotion,
+        dt: f32,
+    ) -> Result<(), Reason> {
         let body = self.body.as_ref().ok_or(Reason::NoEffectHere)?;
         let at_load = (self.at_load.center(), self.at_load.axes());
+        let driven = DrivenBody::new(body, at_load, frame, motion);
+        if !driven.bears_wrench(dt) {
+            return Err(Reason::OutOfRange);
+        }
         self.moved = Some(frame);
-        self.driven = Some(DrivenBody::new(body, at_load, frame, motion));
+        self.driven = Some(driven);
         Ok(())
     }
 

@@ -129,8 +129,8 @@ impl Action {
                  bounds, no rotation"
             }
             Self::DriveBody { .. } => {
-                "coordinates and velocity within 1e7, angular velocity within 1e4 rad/s, rotation not 0; in 2-D, \
-                 z 0 and rotations about z"
+                "coordinates within 1e7, rotation not 0, velocity within 1e7 m/s and angular velocity within 1e4 rad/s, \
+                 also after a step of the force and torque; in 2-D, z 0 and rotations about z"
             }
             Self::Load { .. } => "a scene that the node can read; see its messages",
             Self::Step { .. } => "1 or more",

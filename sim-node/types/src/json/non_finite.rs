@@ -9,8 +9,19 @@ use serde::{Deserialize, Serialize, Serializer};
 ///
 /// A finite value is written with the fewest digits that read back as the same f32, a non-finite
 /// value as the string "nan", "inf" or "-inf".
-#[derive(Debug, Clone, Copy, PartialEq)]
+///
+/// Two numbers are equal if JSON writes them alike: any NaN equals any other, and 0 differs from -0.
+#[derive(Debug, Clone, Copy)]
 pub struct PlainF32(pub f32);
+
+impl PartialEq for PlainF32 {
+    fn eq(&self, other: &Self) -> bool {
+        let (a, b) = (self.0, other.0);
+        a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan())
+    }
+}
+
+impl Eq for PlainF32 {}
 
 impl Serialize for PlainF32 {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
@@ -151,5 +162,19 @@ pub(crate) mod rotation {
         deserializer: D,
     ) -> Result<[f32; 4], D::Error> {
         <[PlainF32; 4]>::deserialize(deserializer).map(|numbers| numbers.map(|number| number.0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_equal_if_json_writes_them_alike() {
+        let other_nan = f32::from_bits(f32::NAN.to_bits() ^ (1 << 31));
+        assert_eq!(PlainF32(f32::NAN), PlainF32(other_nan));
+        assert_eq!([PlainF32(1.5); 3], [PlainF32(1.5); 3]);
+        assert_ne!(PlainF32(0.0), PlainF32(-0.0));
+        assert_ne!(PlainF32(f32::NAN), PlainF32(0.0));
     }
 }

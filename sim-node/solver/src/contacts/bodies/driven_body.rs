@@ -2,12 +2,14 @@
 
 use glam::{Quat, Vec3};
 
-use sim_types::Reason;
+use sim_types::{COORDINATE_MAX, Reason};
 
-use crate::checks::{check_finite, is_near};
+use crate::checks::check_finite;
 use crate::frame::Frame;
 use crate::scene::definition::collider::ColliderBody;
 
+/// Largest component of a velocity, in units per second.
+const SPEED_MAX: f32 = COORDINATE_MAX;
 /// Largest component of an angular velocity, in rad/s.
 const SPIN_MAX: f32 = 1e4;
 
@@ -35,15 +37,35 @@ impl BodyMotion {
         let leaves_plane = linear.iter().any(|vector| vector[2] != 0.0)
             || angular.iter().any(|vector| vector[..2] != [0.0; 2]);
         let is_too_fast =
-            !is_near(velocity) || angular_velocity.iter().any(|axis| axis.abs() > SPIN_MAX);
+            !is_within(*velocity, SPEED_MAX) || !is_within(*angular_velocity, SPIN_MAX);
         if is_too_fast || (is_planar && leaves_plane) { Err(Reason::OutOfRange) } else { Ok(()) }
     }
+}
+
+/// Returns true if no component exceeds `max`. NaN exceeds it.
+fn is_within(vector: [f32; 3], max: f32) -> bool {
+    vector.iter().all(|axis| axis.abs() <= max)
+}
+
+/// Returns `after`, shortened so that no component exceeds `max`, or `before` if it is not finite.
+fn limited(before: Vec3, after: Vec3, max: f32) -> Vec3 {
+    if is_within(after.to_array(), max) {
+        return after;
+    }
+    let largest = after
+        .to_array()
+        .iter()
+        .fold(0.0, |largest, axis| if axis.abs() > largest { axis.abs() } else { largest });
+    if after.is_finite() { after * (max / largest) } else { before }
 }
 
 /// The copy of a body that one step moves.
 ///
 /// Gravity, its wrench and contacts change its velocity, and the velocity moves it (semi-implicit Euler). The
 /// gyroscopic torque is left to the program that owns the body: within a step it is of second order.
+///
+/// Its velocities stay within the limits of a command. Contacts of a body with almost no inertia can give it more, which
+/// f32 could not represent; the excess is lost.
 #[derive(Debug, Clone)]
 pub(crate) struct DrivenBody {
     inverse_mass: f32,
@@ -98,6 +120,13 @@ impl DrivenBody {
         }
     }
 
+    /// Returns true if its force and torque alone, in a step of `dt` seconds, keep the velocities within their limits.
+    pub(crate) fn bears_wrench(&self, dt: f32) -> bool {
+        let linear = self.velocity + self.force * (dt * self.inverse_mass);
+        let angular = self.angular_velocity + self.turned_by(self.torque * dt);
+        is_within(linear.to_array(), SPEED_MAX) && is_within(angular.to_array(), SPIN_MAX)
+    }
+
     /// Pose at the start of the step, with the velocities so far.
     pub(crate) fn at_start(&self) -> BodyState {
         BodyState { frame: self.at_start, linear: self.velocity, angular: self.angular_velocity }
@@ -107,8 +136,17 @@ impl DrivenBody {
     pub(crate) fn begin_substep(&mut self, h: f32, gain: Vec3) {
         self.before = self.now();
         self.h = h;
-        self.velocity += gain + self.force * (h * self.inverse_mass);
-        self.angular_velocity += self.turned_by(self.torque * h);
+        self.change_velocity(gain + self.force * (h * self.inverse_mass));
+        self.change_angular_velocity(self.turned_by(self.torque * h));
+    }
+
+    fn change_velocity(&mut self, change: Vec3) {
+        self.velocity = limited(self.velocity, self.velocity + change, SPEED_MAX);
+    }
+
+    fn change_angular_velocity(&mut self, change: Vec3) {
+        let before = self.angular_velocity;
+        self.angular_velocity = limited(before, before + change, SPIN_MAX);
     }
 
     /// Pose at the start of the running substep.
@@ -125,7 +163,10 @@ impl DrivenBody {
             let turn = Quat::from_xyzw(turn.x, turn.y, turn.z, 0.0);
             (self.before.rotation + turn * self.before.rotation).normalize()
         };
-        Frame { translation: self.before.translation + self.velocity * self.h, rotation }
+        let before = self.before.translation;
+        // A keyframe with a frame beyond this limit is refused.
+        let translation = limited(before, before + self.velocity * self.h, COORDINATE_MAX);
+        Frame { translation, rotation }
     }
 
     /// Pose and velocities at the end of the running substep, so far.
@@ -158,8 +199,8 @@ impl DrivenBody {
     /// Receives an impulse, times the length of the substep, at the end of an arm.
     pub(crate) fn receive(&mut self, impulse: Vec3, arm: Vec3) {
         let impulse = impulse / self.h;
-        self.velocity += impulse * self.inverse_mass;
-        self.angular_velocity += self.turned_by(arm.cross(impulse));
+        self.change_velocity(impulse * self.inverse_mass);
+        self.change_angular_velocity(self.turned_by(arm.cross(impulse)));
     }
 
     /// Angular velocity that an angular impulse gives.

@@ -1,7 +1,9 @@
 //! Bodies of other programs, against the laws of rigid bodies.
 
 use glam::{DQuat, DVec3, Vec3};
-use sim_solver::{BodyMotion, Kernels, ParameterValue, Pose, Reason, Scene, Solver};
+use sim_solver::{
+    BodyMotion, ColliderGeometry, Kernels, ParameterValue, Pose, Reason, Scene, Solver,
+};
 
 use crate::{assert_at_most, assert_close, assert_near, bits, rates, solver};
 
@@ -425,12 +427,51 @@ fn wrong_commands_are_refused_and_change_nothing() {
         (BodyMotion { torque: [0.0, f32::INFINITY, 0.0], ..still }, Reason::NonFinite),
         (BodyMotion { velocity: [2e7, 0.0, 0.0], ..still }, Reason::OutOfRange),
         (BodyMotion { angular_velocity: [0.0, 2e4, 0.0], ..still }, Reason::OutOfRange),
+        (BodyMotion { torque: [0.0, 1e30, 0.0], ..still }, Reason::OutOfRange),
+        (BodyMotion { force: [0.0, 0.0, -1e38], ..still }, Reason::OutOfRange),
     ];
     for (motion, reason) in wrong {
         assert_eq!(solver.drive_body(1, pose, &motion), Err(reason), "{motion:?}");
     }
     solver.drive_body(1, pose, &still).unwrap();
     assert_eq!(bits(&solver), before);
+}
+
+/// A needle, which hardly resists a turn about its axis, under a torque across the axis: the body turns, and soon the
+/// torque acts about the axis.
+#[test]
+fn no_torque_and_no_contact_gives_a_body_a_state_that_is_not_finite() {
+    let body = "body = { mass = 1, inertia = [1e-30, 1, 1] }";
+    let text = "[solver]\nrate_hz = 10\nsubsteps = 100\n[[particle]]\nposition = [0.6, 0, 0.1]\nmass = 1e20\n\
+         [[collider]]\nshape = \"box\"\ncenter = [0, 0, 0]\nhalf_extents = [0.5, 0.2, 0.2]\nfriction = 1\n";
+    let mut solver = measured(&format!("{text}{body}\n"));
+    let mut pose = Pose { translation: [0.0; 3], rotation: [0.0, 0.0, 0.0, 1.0] };
+    let motion = BodyMotion {
+        velocity: [10.0, 0.0, 0.0],
+        angular_velocity: [0.0, 30.0, 0.0],
+        torque: [0.0, 0.0, 9e4],
+        ..BodyMotion::default()
+    };
+    let mut refused_count = 0;
+    for _ in 0..20 {
+        if solver.drive_body(0, pose, &motion).is_err() {
+            // The torque acts about the axis already.
+            (pose.rotation, refused_count) = ([0.0, 0.0, 0.0, 1.0], refused_count + 1);
+            continue;
+        }
+        solver.step();
+        let collider = solver.colliders().next().unwrap();
+        let ColliderGeometry::Box { center, rotation, .. } = collider.shape else { panic!() };
+        let spin = collider.angular_velocity;
+        for number in center.iter().chain(&rotation).chain(&collider.velocity).chain(&spin) {
+            assert!(number.is_finite(), "{collider:?}");
+        }
+        assert!(spin.iter().all(|axis| axis.abs() <= 1e4), "{spin:?}");
+        let state: Vec<_> = solver.particles().to_vec();
+        solver.restore(&state, &solver.keyframe()).unwrap();
+        pose = Pose { translation: center, rotation };
+    }
+    assert!((1..=10).contains(&refused_count), "{refused_count} of 20 commands were refused");
 }
 
 #[test]
