@@ -11,6 +11,7 @@ use thiserror::Error;
 use sim_types::SCENE_SIZE_BYTES_MAX;
 
 use crate::files::kind::kind_of_non_file;
+use crate::files::mesh_format::other_format;
 
 /// Error of reading a text file.
 #[derive(Debug, Error)]
@@ -21,6 +22,9 @@ pub enum TextFileError {
     /// The path names a directory, FIFO, socket or device. Reading it could wait or never end.
     #[error("it is {0}, not a regular file")]
     NotRegular(&'static str),
+    /// The file is a mesh or a scene in another format than the ones that are read.
+    #[error("it is {0}; only Wavefront OBJ is read: export the mesh in that format")]
+    OtherFormat(&'static str),
     /// The file is longer than a scene may be.
     #[error("it is longer than {SCENE_SIZE_BYTES_MAX} bytes")]
     TooLong,
@@ -36,7 +40,7 @@ pub enum TextFileError {
 /// Reads at most [`SCENE_SIZE_BYTES_MAX`] bytes.
 ///
 /// # Errors
-/// The file cannot be opened or read, is not a regular file, is too long or is not text.
+/// The file cannot be opened or read, is not a regular file, has another format, is too long or is not text.
 pub fn read_scene_file(path: impl AsRef<Path>) -> Result<String, TextFileError> {
     let path = path.as_ref();
     // Opening a device can have side effects, so the type is checked first.
@@ -55,8 +59,12 @@ fn check_regular(metadata: &Metadata) -> Result<(), TextFileError> {
 }
 
 fn read_bounded(file: File) -> Result<String, TextFileError> {
+    let size_bytes = file.metadata()?.len();
     let mut bytes = Vec::new();
     let length = file.take(SCENE_SIZE_BYTES_MAX as u64 + 1).read_to_end(&mut bytes)?;
+    if let Some(format) = other_format(&bytes, size_bytes) {
+        return Err(TextFileError::OtherFormat(format));
+    }
     if length > SCENE_SIZE_BYTES_MAX {
         return Err(TextFileError::TooLong);
     }
@@ -133,6 +141,16 @@ mod tests {
         assert_eq!(read_scene_file(&file.0).unwrap().len(), SCENE_SIZE_BYTES_MAX);
         std::fs::write(&file.0, b"version = 1\nname = 'caf\xe9'\n").unwrap();
         let text = "line 2 is not text in UTF-8; save the file in this encoding";
+        assert_eq!(error(&file.0), text);
+    }
+
+    #[test]
+    fn a_mesh_in_another_format_is_told_by_its_content_whatever_its_size() {
+        let file = TemporaryPath::new("model.obj");
+        std::fs::write(&file.0, b"glTF\x02\0\0\0\xff\xff\0\0").unwrap();
+        let handle = OpenOptions::new().write(true).open(&file.0).unwrap();
+        handle.set_len(SCENE_SIZE_BYTES_MAX as u64 + 9).unwrap();
+        let text = "it is a glTF file (binary); only Wavefront OBJ is read: export the mesh in that format";
         assert_eq!(error(&file.0), text);
     }
 
