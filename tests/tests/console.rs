@@ -268,6 +268,46 @@ fn import_names_a_broken_mesh_once() {
 }
 
 #[test]
+fn a_mesh_in_another_format_is_named_by_every_command_that_reads_it() {
+    let sandbox = Sandbox::new();
+    let mesh = sandbox.path("model.obj");
+    let collider = "version = 1\n[[collider]]\nshape = \"mesh\"\npath = \"model.obj\"\n";
+    let scene = sandbox.write("scene.toml", collider);
+    for (content, format) in [
+        (&b"glTF\x02\0\0\0\xff\xfe"[..], "a glTF file (binary)"),
+        (b"{ \"asset\": { \"version\": \"2.0\" } }", "a glTF file (JSON)"),
+        (b"#usda 1.0\n", "a USD file (text)"),
+        (b"ply\nformat ascii 1.0\n", "a PLY file"),
+    ] {
+        std::fs::write(&mesh, content).unwrap();
+        let expected =
+            format!("it is {format}; only Wavefront OBJ is read: export the mesh in that format");
+        for line in [format!("import {mesh}"), format!("check {scene}")] {
+            let refused = run(&sandbox, &line);
+            assert_eq!(refused.code, Some(1), "{line}");
+            assert!(refused.stderr.contains(&expected), "{line}: {}", refused.stderr);
+        }
+    }
+}
+
+#[test]
+fn a_table_can_be_appended_to_an_imported_mesh_and_to_a_shown_scene() {
+    let sandbox = Sandbox::new();
+    let mesh = sandbox.write("mesh.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    for line in [format!("import {mesh}"), "show curtain".to_owned()] {
+        let text = run(&sandbox, &line).success();
+        for table in [
+            "[[particle]]\nposition = [0, 0, 0]\n",
+            "[[collider]]\nshape = \"plane\"\nnormal = [0, 1, 0]\noffset = -9\n",
+            "[[anchor]]\nparticles = [1]\n",
+        ] {
+            let scene = sandbox.write("scene.toml", &format!("{text}{table}"));
+            run(&sandbox, &format!("check {scene}")).success();
+        }
+    }
+}
+
+#[test]
 fn import_says_which_densities_and_pins_it_accepts() {
     let sandbox = Sandbox::new();
     let mesh = sandbox.write("mesh.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");

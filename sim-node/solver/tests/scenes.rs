@@ -57,6 +57,27 @@ fn the_number_of_links_of_a_cloth_has_a_closed_form() {
 }
 
 #[test]
+fn a_table_can_be_appended_to_the_complete_text_of_every_builtin_scene() {
+    let particle = "[[particle]]\nposition = [0, 0, 0]\npinned = true\n";
+    let tables = [
+        particle.to_owned(),
+        format!("{particle}{particle}[[constraint]]\nparticles = [0, 1]\nrest_length = 1\n"),
+        "[[collider]]\nshape = \"plane\"\nnormal = [0, 1, 0]\noffset = -100\n".to_owned(),
+        "[[generate]]\nshape = \"rope\"\ncount = 2\nfrom = [0, 0, 0]\nto = [1, 0, 0]\n".to_owned(),
+        format!("{particle}[[anchor]]\nparticles = [0]\n"),
+    ];
+    for name in builtin::names() {
+        let text = builtin_scene(name).to_toml();
+        for table in &tables {
+            let appended = Scene::from_toml(&format!("{text}{table}"), name);
+            // Particles of the first anchor of such a scene have one already.
+            let problem = appended.err().map(|error| error.problem).unwrap_or_default();
+            assert!(problem.is_empty() || problem.contains("anchor"), "{name}: {problem}\n{table}");
+        }
+    }
+}
+
+#[test]
 fn every_builtin_scene_survives_the_round_trip_through_its_complete_text() {
     for name in builtin::names() {
         let scene = builtin_scene(name);

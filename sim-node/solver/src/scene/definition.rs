@@ -56,22 +56,22 @@ pub struct Scene {
     /// Contacts of particles with each other.
     pub contact: ContactSettings,
     /// Explicit particles. They have the first indices.
-    #[serde(rename = "particle")]
+    #[serde(rename = "particle", skip_serializing_if = "Vec::is_empty")]
     pub particles: Vec<SceneParticle>,
     /// Explicit constraints. They have the first indices and may join generated particles.
-    #[serde(rename = "constraint")]
+    #[serde(rename = "constraint", skip_serializing_if = "Vec::is_empty")]
     pub constraints: Vec<SceneConstraint>,
     /// Explicit bends. They have the first indices of bends.
     #[serde(rename = "bend", skip_serializing_if = "Vec::is_empty")]
     pub bends: Vec<SceneBend>,
     /// Colliders, in the order in which they act.
-    #[serde(rename = "collider")]
+    #[serde(rename = "collider", skip_serializing_if = "Vec::is_empty")]
     pub colliders: Vec<SceneCollider>,
     /// Particles that follow moving frames.
-    #[serde(rename = "anchor")]
+    #[serde(rename = "anchor", skip_serializing_if = "Vec::is_empty")]
     pub anchors: Vec<SceneAnchor>,
     /// Generators of further particles and constraints, in order.
-    #[serde(rename = "generate")]
+    #[serde(rename = "generate", skip_serializing_if = "Vec::is_empty")]
     pub generators: Vec<Generator>,
     /// Warnings from reading the scene and the files that it names, one sentence each.
     #[serde(skip)]
