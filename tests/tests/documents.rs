@@ -92,6 +92,7 @@ fn the_scene_reference_and_the_dictionary_of_the_fuzzer_name_every_key() {
         "[[generate]]\nshape = \"cloth\"",
         "[[generate]]\nshape = \"obj\"",
         "[[generate]]\nshape = \"obj\"\n[generate.compliance]",
+        "[[generate]]\nshape = \"obj\"\n[[generate.groups]]",
     ] {
         let scene = sandbox.write("wrong.toml", &format!("version = 1\n{table}\nnonsense = 1\n"));
         let checked = Process::run(Program::SimNode, &sandbox, &["check", &scene]);

@@ -36,6 +36,7 @@ pub use generate::ragdoll::Ragdoll;
 pub use generate::rope::Rope;
 pub use generate::web::Web;
 pub use generate::{Generator, Shape};
+pub use mesh::details::{FaceDetails, NameRun};
 pub use mesh::pins::check_pin_expression;
 pub use mesh::{Mesh, ParsedMesh};
 pub use poses::ScenePoses;

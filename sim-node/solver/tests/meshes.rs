@@ -2,7 +2,7 @@
 //! omitted with a warning.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
-use sim_solver::scene::Mesh;
+use sim_solver::scene::{Mesh, NameRun};
 use sim_solver::{Scene, SceneError, Solver};
 
 /// Returns a scene with one mesh.
@@ -171,6 +171,120 @@ fn groups_can_be_pinned() {
     assert_eq!(scene.counts().pins, 3);
     let error = mesh_scene(text, "pinned = \"group hem\"").unwrap_err().to_string();
     assert!(error.contains("the mesh has no group 'hem' (allowed: body, collar)"), "{error}");
+}
+
+#[test]
+fn a_mesh_can_be_placed_any_number_of_times_and_keeps_its_pins() {
+    let block = "[[generate]]\nshape = \"obj\"\npath = \"mesh.obj\"\npinned = \"y < 1\"\n";
+    // A quarter of a turn about z, twice the size, and moved; and the mesh as it is.
+    let text = format!(
+        "version = 1\n{block}scale = 2\nrotation = [0, 0, 1, 1]\norigin = [10, 0, -3]\n{block}"
+    );
+    let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    let scene = Scene::from_toml_with_files(&text, "a", &|_| Ok(obj.to_owned())).unwrap();
+    let solver = Solver::new(&scene);
+    let particle = |index: usize| solver.particle(index);
+    let positions: Vec<_> = (0..6).map(|index| particle(index).position).collect();
+    assert_eq!(positions[3..], [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
+    let placed = [[10.0, 0.0, -3.0], [10.0, 2.0, -3.0], [8.0, 0.0, -3.0]];
+    for (found, expected) in positions.iter().zip(placed) {
+        let is_near = |(found, expected): (&f32, f32)| (found - expected).abs() < 1e-6;
+        assert!(found.iter().zip(expected).all(is_near), "{found:?} {expected:?}");
+    }
+    // The pins compare the scaled mesh before it is turned and moved.
+    let pins: Vec<_> = (0..6).filter(|index| particle(*index).inverse_mass == 0.0).collect();
+    assert_eq!(pins, [0, 1, 3, 4]);
+    let again = Scene::from_toml(&scene.to_toml(), "a").unwrap();
+    assert_eq!(again, scene);
+    assert!(!scene.to_toml().contains("origin = [10"), "the printed mesh is placed already");
+}
+
+#[test]
+fn pins_that_match_nothing_are_named_with_the_coordinates_of_the_mesh() {
+    let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    let keys = "origin = [10, 0, 0]\npinned = \"x > 5\"";
+    let warnings = mesh_scene(obj, keys).unwrap().warnings().join("\n");
+    let expected =
+        "generate[0].pinned matches no particle of the shape (x 0 to 1, y 0 to 1, z 0 to 0)";
+    assert_eq!(warnings, expected);
+}
+
+/// A quad and two triangles. The third face has no area, and the fourth no texture coordinates.
+const DETAILED: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 2 0\nv 1 2 0\nvt 0 0\nvt 1 0\nvt 1 0.5\n\
+    vt 0 0.5 0\nvt 9 9\nvt 0 nan\nusemtl cotton\ng front side\nf 1/1 2/2 3/3 4/4\ng back\n\
+    f 4/-3 3/3/1 5/1\nf 1/1 2/2 1/1\nusemtl silk\nf 3 5 6\n";
+
+#[test]
+fn texture_coordinates_and_names_of_faces_are_kept() {
+    let mesh = Mesh::from_obj(DETAILED).unwrap().mesh;
+    assert_eq!(mesh.faces, [vec![0, 1, 2, 3], vec![3, 2, 4], vec![2, 4, 5]]);
+    let details = &mesh.details;
+    assert_eq!(
+        details.uvs,
+        [[0.0, 0.0], [1.0, 0.0], [1.0, 0.5], [0.0, 0.5]],
+        "unused ones are not"
+    );
+    assert_eq!(details.face_uvs, [vec![0, 1, 2, 3], vec![3, 2, 0], vec![]]);
+    let names = |runs: &[NameRun], faces: &[usize]| -> Vec<Option<String>> {
+        faces.iter().map(|face| NameRun::of_face(runs, *face).map(str::to_owned)).collect()
+    };
+    let some = |name: &str| Some(name.to_owned());
+    assert_eq!(
+        names(&details.groups, &[0, 1, 2]),
+        [some("front side"), some("back"), some("back")]
+    );
+    assert_eq!(
+        names(&details.materials, &[0, 1, 2]),
+        [some("cotton"), some("cotton"), some("silk")]
+    );
+    let scene = mesh_scene(DETAILED, "").unwrap();
+    let again = Scene::from_toml(&scene.to_toml(), "test").unwrap();
+    assert_eq!(again.generators, scene.generators);
+    assert_eq!(again.to_toml(), scene.to_toml());
+}
+
+#[test]
+fn texture_coordinates_that_do_not_exist_are_omitted_with_a_warning() {
+    let lost = |face: &str| {
+        let text = format!("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt x\n{face}\n");
+        let parsed = Mesh::from_obj(&text).unwrap();
+        assert_eq!(parsed.mesh.details.face_uvs.concat(), []);
+        parsed.warnings
+    };
+    for face in ["f 1/1 2/1 3/9", "f 1/1 2/1 3/-9", "f 1/1 2/1 3/2", "f 1/0 2/1 3/1"] {
+        let expected =
+            "1 face refers to texture coordinates that are missing or not finite, and loses them";
+        assert_eq!(lost(face), [expected], "{face}");
+    }
+    for face in ["f 1/1 2 3/1", "f 1 2 3"] {
+        assert!(lost(face).is_empty(), "{face}");
+    }
+}
+
+#[test]
+fn a_group_for_each_face_is_omitted_with_a_warning_and_can_be_pinned() {
+    let mut obj = String::from("usemtl silk\nv 0 0 0\nv 0 1 0\n");
+    for face in 1..=10_001 {
+        obj += &format!("v {face} 0 0\nv {face} 1 0\ng face{face}\n");
+        let first = 2 * face - 1;
+        obj += &format!("f {first} {} {} {}\n", first + 2, first + 3, first + 1);
+    }
+    let scene = mesh_scene(&obj, "pinned = \"group face7\"").unwrap();
+    let warning = "mesh.obj: the faces change their group 10001 times, so the names are omitted (allowed: 10000)";
+    assert_eq!(scene.read_warnings, [warning]);
+    assert!(scene.to_toml().contains("silk"), "materials are kept");
+    assert_eq!(scene.counts().pins, 4);
+}
+
+#[test]
+fn names_that_make_the_text_too_long_are_omitted_with_a_warning() {
+    let long = "m".repeat(17 << 20);
+    let obj = format!("v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl {long}\nf 1 2 3\n");
+    let scene = mesh_scene(&obj, "").unwrap();
+    assert!(!scene.to_toml().contains("materials"));
+    let warning =
+        "texture coordinates, groups and materials are omitted, because the text of the scene";
+    assert!(scene.warnings().iter().any(|one| one.starts_with(warning)), "{:?}", scene.warnings());
 }
 
 #[test]

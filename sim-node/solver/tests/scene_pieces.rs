@@ -123,6 +123,21 @@ fn a_mesh_can_be_divided_between_vertices_faces_and_pinned_vertices() {
 }
 
 #[test]
+fn texture_coordinates_can_be_divided_like_vertices() {
+    let details = "uvs = [@ [0, 0], @ [1, 0.5], [0, 1]]\nface_uvs = [@ [0, 1, 2], @ []]\n\
+        [[generate.groups]]\nname = \"a\"\nfirst = 0\n[[generate.groups]]\nname = \"b\"\nfirst = 1\n";
+    let ragdoll = "[[generate]]\nshape = \"ragdoll\"\nheight = 1\n";
+    let scene = read(&format!("{MESH}{details}{ragdoll}")).unwrap();
+    let Shape::Obj(mesh) = &scene.generators[0].shape else { panic!("{scene:?}") };
+    assert_eq!(mesh.details.uvs, [[0.0, 0.0], [1.0, 0.5], [0.0, 1.0]]);
+    assert_eq!(mesh.details.face_uvs, [vec![0, 1, 2], vec![]]);
+    let names: Vec<_> =
+        mesh.details.groups.iter().map(|run| (run.name.as_str(), run.first)).collect();
+    assert_eq!(names, [("a", 0), ("b", 1)]);
+    assert_eq!((mesh.vertices.len(), scene.generators.len()), (4, 2));
+}
+
+#[test]
 fn a_mesh_of_a_collider_can_be_divided_between_vertices_and_faces() {
     let text = "version = 1\n@[[collider]]\nshape = \"sphere\"\ncenter = [0, 0, 0]\nradius = 1\n\
         @[[collider]]\nshape = \"mesh\"\n\

@@ -6,7 +6,7 @@ use std::fmt::Write;
 
 use libfuzzer_sys::fuzz_target;
 use sim_solver::Scene;
-use sim_solver::scene::Mesh;
+use sim_solver::scene::{Mesh, NameRun};
 
 const SCENE: &str = "version = 1\n[[generate]]\nshape = \"obj\"\npath = \"mesh.obj\"\n";
 
@@ -20,6 +20,7 @@ fuzz_target!(|text: &str| {
     check(&parsed.mesh);
     let again = Mesh::from_obj(&obj(&parsed.mesh)).expect("a printed mesh is valid").mesh;
     assert_eq!((&again.vertices, &again.faces), (&parsed.mesh.vertices, &parsed.mesh.faces));
+    assert_eq!(again.details, parsed.mesh.details);
     if let Ok(scene) = scene {
         let again =
             Scene::from_toml(&scene.to_toml(), "scene.toml").expect("a printed scene is valid");
@@ -44,14 +45,29 @@ fn check(mesh: &Mesh) {
     }
 }
 
-/// Prints a mesh without its groups.
+/// Prints a mesh with the details of its faces.
 fn obj(mesh: &Mesh) -> String {
     let mut text = String::new();
     for [x, y, z] in &mesh.vertices {
         _ = writeln!(text, "v {x} {y} {z}");
     }
-    for face in &mesh.faces {
-        let corners: Vec<_> = face.iter().map(|corner| (corner + 1).to_string()).collect();
+    let details = &mesh.details;
+    for [u, v] in &details.uvs {
+        _ = writeln!(text, "vt {u} {v}");
+    }
+    for (index, face) in mesh.faces.iter().enumerate() {
+        let name = |runs| NameRun::of_face(runs, index).unwrap_or_default();
+        _ = writeln!(text, "g {}\nusemtl {}", name(&details.groups), name(&details.materials));
+        let uvs = match details.face_uvs.get(index) {
+            Some(uvs) => uvs.as_slice(),
+            None if details.uvs.is_empty() => &[],
+            None => face,
+        };
+        let corner = |(place, corner): (usize, &u32)| match uvs.get(place) {
+            Some(uv) => format!("{}/{}", corner + 1, uv + 1),
+            None => (corner + 1).to_string(),
+        };
+        let corners: Vec<_> = face.iter().enumerate().map(corner).collect();
         _ = writeln!(text, "f {}", corners.join(" "));
     }
     text

@@ -17,6 +17,7 @@ use serde::Serialize;
 use sim_types::STEP_WORK_MAX;
 
 use super::generate::{Generator, Shape};
+use super::mesh::details::FaceDetails;
 use super::model::{Model, Positions};
 use crate::checks::StepSize;
 use anchor::SceneAnchor;
@@ -156,6 +157,17 @@ impl Scene {
             end += generator.shape.particle_count();
             (&generator.shape, first..end)
         })
+    }
+
+    /// Removes what only exports use of the meshes. Returns `true` if there was any.
+    pub(crate) fn remove_face_details(&mut self) -> bool {
+        let mut has_removed = false;
+        for generator in &mut self.generators {
+            if let Shape::Obj(obj) = &mut generator.shape {
+                has_removed |= std::mem::take(&mut obj.details) != FaceDetails::default();
+            }
+        }
+        has_removed
     }
 
     /// Counts particles, constraints and pinned particles, including the generated ones.

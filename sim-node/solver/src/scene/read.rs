@@ -97,7 +97,7 @@ impl Scene {
             return reader.error(solver.place_of_passes(), "solver", problem);
         }
         reader.complete_contact(&mut scene, contact_place)?;
-        reader.check_text_size(&scene)?;
+        reader.check_text_size(&mut scene)?;
         scene.read_warnings = reader.warnings.take();
         Ok(scene)
     }
@@ -263,9 +263,17 @@ impl Reader<'_> {
         self.error(0..0, "scene", problem)
     }
 
-    /// Refuses a scene whose complete text is too long to be published.
-    fn check_text_size(&self, scene: &Scene) -> Result<(), SceneError> {
-        let size_bytes = scene.to_toml().len();
+    /// Refuses a scene whose complete text is too long to be published. What only exports use of its meshes is
+    /// left out first.
+    fn check_text_size(&self, scene: &mut Scene) -> Result<(), SceneError> {
+        let mut size_bytes = scene.to_toml().len();
+        if size_bytes > SCENE_SIZE_BYTES_MAX && scene.remove_face_details() {
+            self.warnings.borrow_mut().push(format!(
+                "texture coordinates, groups and materials are omitted, because the text of the scene would have \
+                 {size_bytes} bytes with them (allowed: {SCENE_SIZE_BYTES_MAX})"
+            ));
+            size_bytes = scene.to_toml().len();
+        }
         if size_bytes <= SCENE_SIZE_BYTES_MAX {
             return Ok(());
         }

@@ -54,6 +54,18 @@ pub(crate) mod vectors {
     }
 }
 
+/// `#[serde(serialize_with = "decimal::pairs::serialize")]` for a list of two f32 each.
+pub(crate) mod pairs {
+    use super::{Serializer, shortest};
+
+    pub(crate) fn serialize<S: Serializer>(
+        values: &[[f32; 2]],
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        serializer.collect_seq(values.iter().map(|value| value.map(shortest)))
+    }
+}
+
 /// `#[serde(with = "decimal::optional")]` for an optional f32.
 pub(crate) mod optional {
     use super::{Serialize, Serializer, shortest};

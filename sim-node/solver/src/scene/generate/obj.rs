@@ -9,6 +9,7 @@ use super::builder::{ConstraintBuilder, ParticleBuilder, round};
 use super::hinges::Hinges;
 use crate::scene::definition::bending::MeshBending;
 use crate::scene::definition::decimal;
+use crate::scene::mesh::details::FaceDetails;
 use crate::scene::mesh::{Mesh, area, edges, fan};
 
 /// A mesh of polygons. Vertices become particles, and edges become structural constraints. The
@@ -28,12 +29,26 @@ pub struct Obj {
     /// Bending rigidity, if it has any.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub bending: Option<MeshBending>,
+    /// What exports write with the faces.
+    #[serde(flatten)]
+    pub details: FaceDetails,
 }
 
 impl Obj {
     /// Creates the shape of a mesh.
     pub fn new(mesh: Mesh, density: Option<f32>, bending: Option<MeshBending>) -> Self {
-        Self { vertices: mesh.vertices, faces: mesh.faces, density, bending }
+        let Mesh { vertices, faces, details, groups: _ } = mesh;
+        Self { vertices, faces, density, bending, details }
+    }
+
+    /// Returns the indices of the texture coordinates of a face, one for each corner; none if it has none.
+    pub fn face_uvs(&self, face: usize) -> &[u32] {
+        let FaceDetails { uvs, face_uvs, .. } = &self.details;
+        match face_uvs.get(face) {
+            Some(corners) => corners,
+            None if uvs.is_empty() => &[],
+            None => &self.faces[face],
+        }
     }
 
     pub(super) fn particle_count(&self) -> u64 {
@@ -178,7 +193,8 @@ mod tests {
         let corners: Vec<u32> = (0..count).collect();
         let backwards: Vec<u32> = corners.iter().rev().copied().collect();
         let vertices = vec![[0.0; 3]; corners.len()];
-        let obj = Obj { vertices, faces: vec![corners, backwards], density: None, bending: None };
+        let mesh = Mesh { vertices, faces: vec![corners, backwards], ..Mesh::default() };
+        let obj = Obj::new(mesh, None, None);
         // n edges, n - 3 diagonals from the first corner of each face, of which the one between the two
         // first corners is an edge; no bends, because both faces have the same neighbours.
         let diagonals = 2 * (u64::from(count) - 3);

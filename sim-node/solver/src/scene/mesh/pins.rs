@@ -24,6 +24,19 @@ pub(in crate::scene) fn matching_vertices(
     Ok(pinned.map(|(index, _)| index).collect())
 }
 
+/// Returns the coordinates of a mesh on each axis, because its pins are compared with them.
+pub(in crate::scene) fn extent(mesh: &Mesh) -> String {
+    let range = |axis: usize| {
+        let mut values: Vec<_> = mesh.vertices.iter().map(|vertex| vertex[axis]).collect();
+        values.sort_unstable_by(f32::total_cmp);
+        let (Some(least), Some(most)) = (values.first(), values.last()) else {
+            return String::new();
+        };
+        format!("{} {least} to {most}", ["x", "y", "z"][axis])
+    };
+    [0, 1, 2].map(range).join(", ")
+}
+
 /// Checks the form of the choice of pinned vertices that a command line gives for a mesh: `none` or
 /// an expression. The names of groups are left to the mesh.
 ///

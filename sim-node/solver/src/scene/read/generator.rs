@@ -65,7 +65,21 @@ static SHAPES: [ShapeKeys; 7] = [
     ShapeKeys { name: "ragdoll", keys: &["origin", "height"], pins: &ragdoll::PIN_WORDS },
     ShapeKeys {
         name: "obj",
-        keys: &["path", "scale", "density", "vertices", "faces", "bending", "rest"],
+        keys: &[
+            "path",
+            "vertices",
+            "faces",
+            "scale",
+            "rotation",
+            "origin",
+            "density",
+            "bending",
+            "rest",
+            "uvs",
+            "face_uvs",
+            "groups",
+            "materials",
+        ],
         pins: &["none"],
     },
 ];

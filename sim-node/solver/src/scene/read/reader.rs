@@ -5,7 +5,7 @@ use std::ops::{Range, RangeInclusive};
 
 use sim_types::{Method, NumberRange, Parameter, did_you_mean};
 
-use super::value::{Number, Quaternion, Spanned, Vector, Whole, Word};
+use super::value::{Number, Quaternion, Spanned, Tuple, Vector, Whole, Word};
 use crate::scene::definition::anchor::NO_ROTATION;
 use crate::scene::error::{Place, SceneError};
 use crate::scene::model::Positions;
@@ -115,6 +115,16 @@ impl Reader<'_> {
         }
         let problem = format!("{} is out of range (allowed: {})", self.text(number), range.text);
         self.error(number.span(), field, problem)
+    }
+
+    /// Returns two finite numbers.
+    pub(super) fn pair(
+        &self,
+        field: &str,
+        pair: &Spanned<Tuple<Number, 2>>,
+    ) -> Result<[f32; 2], SceneError> {
+        let [u, v] = &**pair.get_ref();
+        Ok([self.finite(field, u)?, self.finite(field, v)?])
     }
 
     /// Returns a limit, or infinity for none.

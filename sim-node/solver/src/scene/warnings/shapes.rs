@@ -46,16 +46,13 @@ pub(super) fn on_a_line(scene: &Scene) -> Vec<String> {
     scene.generators.iter().enumerate().filter_map(sentence).collect()
 }
 
-/// Warns of lists and expressions for particles that match none.
+/// Warns of empty lists of particles. The reader warns of expressions that no vertex of a mesh matches.
 pub(super) fn without_pins(scene: &Scene) -> Vec<String> {
     let matches_none = |one: &Generator| one.pinned == Pinned::List(Vec::new());
     let generators = scene.generators.iter().enumerate().filter(|(_, one)| matches_none(one));
     let anchors = scene.anchors.iter().enumerate().filter(|(_, one)| one.particles.is_empty());
     generators
-        .map(|(index, one)| {
-            let extent = extent(&one.shape);
-            format!("generate[{index}].pinned matches no particle of the shape{extent}")
-        })
+        .map(|(index, _)| format!("generate[{index}].pinned matches no particle of the shape"))
         .chain(anchors.map(|(index, _)| format!("anchor[{index}].particles is empty")))
         .collect()
 }
@@ -76,18 +73,4 @@ pub(super) fn loose_faces(scene: &Scene) -> Vec<String> {
         })
     };
     scene.generators.iter().enumerate().filter_map(sentence).collect()
-}
-
-/// Returns the coordinates of a mesh on each axis in parentheses, because its pins are compared with them.
-fn extent(shape: &Shape) -> String {
-    let Shape::Obj(mesh) = shape else { return String::new() };
-    let range = |axis: usize| {
-        let mut values: Vec<_> = mesh.vertices.iter().map(|vertex| vertex[axis]).collect();
-        values.sort_unstable_by(f32::total_cmp);
-        let (Some(least), Some(most)) = (values.first(), values.last()) else {
-            return String::new();
-        };
-        format!("{} {least} to {most}", ["x", "y", "z"][axis])
-    };
-    format!(" ({})", [0, 1, 2].map(range).join(", "))
 }

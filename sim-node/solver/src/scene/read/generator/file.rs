@@ -5,8 +5,8 @@ use std::ops::Range;
 use serde::Deserialize;
 
 use super::super::value::{
-    Number, NumberOrPair, Spanned, Table, TableKeys, Vector, Whole, Word, append, append_elements,
-    element_count,
+    Number, NumberOrPair, Quaternion, Spanned, Table, TableKeys, Tuple, Vector, Whole, Word,
+    append, append_elements, element_count,
 };
 
 /// The keys of all shapes. The keys of each shape are checked later.
@@ -49,9 +49,29 @@ pub(in crate::scene::read) struct FileGenerator {
     pub(in crate::scene::read) density: Option<Number>,
     pub(in crate::scene::read) vertices: Option<Spanned<Vec<Vector>>>,
     pub(in crate::scene::read) faces: Option<Spanned<Vec<Vec<i64>>>>,
+    pub(in crate::scene::read) rotation: Option<Quaternion>,
+    pub(in crate::scene::read) uvs: Option<Spanned<Vec<Pair>>>,
+    pub(in crate::scene::read) face_uvs: Option<Spanned<Vec<Vec<i64>>>>,
+    pub(in crate::scene::read) groups: Option<Spanned<Vec<Spanned<Table<FileNameRun>>>>>,
+    pub(in crate::scene::read) materials: Option<Spanned<Vec<Spanned<Table<FileNameRun>>>>>,
 }
 
 impl TableKeys for FileGenerator {}
+
+/// Two numbers.
+pub(in crate::scene::read) type Pair = Spanned<Tuple<Number, 2>>;
+
+/// The name of the faces from one of them on.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(in crate::scene::read) struct FileNameRun {
+    pub(in crate::scene::read) name: Option<Word>,
+    pub(in crate::scene::read) first: Option<Whole>,
+}
+
+impl TableKeys for FileNameRun {
+    const FORM: &'static str = "a table { name, first }";
+}
 
 /// A softness for each kind of constraint.
 #[derive(Debug, Deserialize)]
@@ -89,12 +109,15 @@ impl FilePinned {
 
 impl FileGenerator {
     /// The lists that a text can give in parts.
-    pub(in crate::scene::read) const LISTS: [&str; 3] = ["vertices", "faces", "pinned"];
+    pub(in crate::scene::read) const LISTS: [&str; 5] =
+        ["vertices", "faces", "pinned", "uvs", "face_uvs"];
 
     /// Appends the lists of a part of the table.
     pub(in crate::scene::read) fn append(&mut self, part: Self) {
         append_elements(self.vertices.as_mut(), part.vertices);
         append_elements(self.faces.as_mut(), part.faces);
+        append_elements(self.uvs.as_mut(), part.uvs);
+        append_elements(self.face_uvs.as_mut(), part.face_uvs);
         let pinned = self.pinned.as_mut().map(Spanned::get_mut);
         if let (Some(FilePinned::List(list)), Some(FilePinned::List(more))) =
             (pinned, part.pinned.map(Spanned::into_inner))
@@ -105,15 +128,16 @@ impl FileGenerator {
 
     /// Returns the size of the lists in memory.
     pub(in crate::scene::read) fn lists_size_bytes(&self) -> usize {
-        let faces = self.faces.iter().flat_map(Spanned::get_ref);
+        let faces = [&self.faces, &self.face_uvs].into_iter().flatten().flat_map(Spanned::get_ref);
         let pinned = self.pinned.as_ref().map_or(&[][..], |pinned| pinned.get_ref().list());
         element_count(self.vertices.as_ref()) * size_of::<Vector>()
+            + element_count(self.uvs.as_ref()) * size_of::<Pair>()
             + faces.map(|face| size_of_val(face) + size_of_val(face.as_slice())).sum::<usize>()
             + size_of_val(pinned)
     }
 
     /// Returns the places of the keys that belong to single shapes.
-    pub(in crate::scene::read) fn shape_keys(&self) -> [(&'static str, Option<Range<usize>>); 29] {
+    pub(in crate::scene::read) fn shape_keys(&self) -> [(&'static str, Option<Range<usize>>); 34] {
         fn span<T>(value: Option<&Spanned<T>>) -> Option<Range<usize>> {
             value.map(Spanned::span)
         }
@@ -147,6 +171,11 @@ impl FileGenerator {
             ("density", span(self.density.as_ref())),
             ("vertices", span(self.vertices.as_ref())),
             ("faces", span(self.faces.as_ref())),
+            ("rotation", span(self.rotation.as_ref())),
+            ("uvs", span(self.uvs.as_ref())),
+            ("face_uvs", span(self.face_uvs.as_ref())),
+            ("groups", span(self.groups.as_ref())),
+            ("materials", span(self.materials.as_ref())),
         ]
     }
 }
