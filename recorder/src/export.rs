@@ -2,6 +2,7 @@
 
 pub(crate) mod data;
 pub(crate) mod frame_names;
+pub(crate) mod frames;
 pub(crate) mod pictures;
 pub(crate) mod selection;
 pub(crate) mod snapshots;

@@ -9,6 +9,7 @@ counts.
 import csv
 import json
 import sys
+import tomllib
 import xml.etree.ElementTree
 from pathlib import Path
 
@@ -32,6 +33,7 @@ class Recording:
             for _schema, _channel, message, cloud in reader.iter_decoded_messages(topics=["/particles"]):
                 self.steps.append(message.sequence)
                 clouds.append(np.frombuffer(cloud.data, "<f4").reshape(-1, 8))
+            (scene,) = (one.data for one in reader.iter_attachments() if one.name == "scene.toml")
         self.particles = np.stack(clouds)
         self.flags = np.ascontiguousarray(self.particles[:, :, 7]).view("<u4")
         topology = self.rows["/topology"][0]
@@ -40,6 +42,11 @@ class Recording:
         self.rest_lengths = np.array(topology["rest_length"], "f4")
         self.triangles = np.array(self.rows["/surface"][0]["triangles"], int).reshape(-1, 3)
         self.rate_hz = 240
+        self.collider_count = len(self.rows.get("/colliders", [{"colliders": []}])[0]["colliders"])
+        # A scene of one mesh has its faces, every other one the triangles.
+        generated = tomllib.loads(scene.decode())["generate"]
+        self.mesh = generated[0] if len(generated) == 1 and "faces" in generated[0] else {}
+        self.faces = self.mesh.get("faces", self.triangles.tolist())
 
     def index(self, step):
         return self.steps.index(step)
@@ -51,11 +58,16 @@ class Recording:
     def untorn(self, step):
         return [i for i in range(len(self.ends)) if i not in self.torn(step)]
 
-    def intact_triangles(self, step):
+    def intact(self, step, polygons):
         torn = [i for i in self.torn(step) if self.kinds[i] == STRUCTURAL]
         edges = {frozenset(self.ends[i].tolist()) for i in torn}
-        corners = self.triangles.tolist()
-        return [t for t in corners if not any(edge <= set(t) for edge in edges)]
+        return [one for one in polygons if not any(edge <= set(one) for edge in edges)]
+
+    def intact_triangles(self, step):
+        return self.intact(step, self.triangles.tolist())
+
+    def intact_faces(self, step):
+        return self.intact(step, self.faces)
 
 
 def same(actual, expected):
@@ -113,12 +125,43 @@ def check_csv(recording, path):
     return len(table) // count
 
 
+def polygons(data):
+    """Returns the corners of the polygons of VTK's PolyData."""
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+
+    cells = data.GetPolys()
+    ends = vtk_to_numpy(cells.GetOffsetsArray())
+    return [part.tolist() for part in np.split(vtk_to_numpy(cells.GetConnectivityArray()), ends[1:-1])]
+
+
+def check_names(recording, data, faces):
+    """Requires the groups of a mesh in cell data, and their names in field data."""
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+
+    names = data.GetFieldData().GetAbstractArray("group_names")
+    names = [names.GetValue(i) for i in range(names.GetNumberOfValues())]
+    numbers = vtk_to_numpy(data.GetCellData().GetArray("group"))[-len(faces) :]
+    runs = recording.mesh["groups"]
+    for face, number in zip(faces, numbers, strict=True):
+        index = recording.faces.index(face)
+        assert names[number] == [run["name"] for run in runs if run["first"] <= index][-1]
+
+
 def check_vtk(recording, folder):
     from vtkmodules.util.numpy_support import vtk_to_numpy
     from vtkmodules.vtkIOXML import vtkXMLPolyDataReader
 
     (collection,) = Path(folder).glob("*.pvd")
     sets = xml.etree.ElementTree.parse(collection).getroot().findall("Collection/DataSet")
+    colliders = [entry for entry in sets if entry.get("part") == "1"]
+    sets = [entry for entry in sets if entry.get("part") == "0"]
+    assert len(colliders) == (len(sets) if recording.collider_count else 0)
+    for entry in colliders:
+        reader = vtkXMLPolyDataReader()
+        reader.SetFileName(str(Path(folder) / entry.get("file")))
+        reader.Update()
+        found = vtk_to_numpy(reader.GetOutput().GetCellData().GetArray("collider"))
+        assert set(found) == set(range(recording.collider_count))
     for entry in sets:
         reader = vtkXMLPolyDataReader()
         reader.SetFileName(str(Path(folder) / entry.get("file")))
@@ -134,14 +177,15 @@ def check_vtk(recording, folder):
         same(vtk_to_numpy(columns.GetArray("inverse_mass")), expected[:, 3])
         flags = vtk_to_numpy(columns.GetArray("flags"))
         assert (flags == recording.flags[recording.index(step)]).all()
-        untorn, triangles = recording.untorn(step), recording.intact_triangles(step)
+        untorn, faces = recording.untorn(step), recording.intact_faces(step)
         lines = vtk_to_numpy(data.GetLines().GetConnectivityArray()).reshape(-1, 2)
         assert (lines == recording.ends[untorn]).all()
-        polygons = vtk_to_numpy(data.GetPolys().GetConnectivityArray()).reshape(-1, 3)
-        assert polygons.tolist() == triangles
+        assert polygons(data) == faces
+        if recording.mesh:
+            check_names(recording, data, faces)
         stretch = vtk_to_numpy(data.GetCellData().GetArray("stretch"))
         vertices = data.GetVerts().GetNumberOfCells()
-        assert len(stretch) == vertices + len(untorn) + len(triangles)
+        assert len(stretch) == vertices + len(untorn) + len(faces)
         a, b = expected[lines[:, 0], 0:3], expected[lines[:, 1], 0:3]
         lengths = np.linalg.norm(a.astype(float) - b.astype(float), axis=1)
         found = stretch[vertices : vertices + len(untorn)]
@@ -158,17 +202,29 @@ def read_obj(path):
     reader.SetFileName(str(path))
     reader.Update()
     data = reader.GetOutput()
-    faces = vtk_to_numpy(data.GetPolys().GetConnectivityArray()).reshape(-1, 3)
-    return vtk_to_numpy(data.GetPoints().GetData()), faces.tolist()
+    return vtk_to_numpy(data.GetPoints().GetData()), polygons(data)
 
 
 def check_obj(recording, folder):
     files = sorted(Path(folder).glob("*.obj"))
+    count = recording.particles.shape[1]
     for file in files:
         step = int(file.stem.split("_")[-1])
-        points, faces = read_obj(file)
-        same(points, recording.particles[recording.index(step), :, 0:3])
-        assert faces == recording.intact_triangles(step)
+        if recording.mesh:
+            # This reader doubles vertices with several texture coordinates, so the faces are read as text.
+            lines = [line.split() for line in file.read_text().splitlines()]
+            points = np.array([line[1:] for line in lines if line[0] == "v"], "f4")
+            corners = [[one.split("/") for one in line[1:]] for line in lines if line[0] == "f"]
+            faces = [[int(one[0]) - 1 for one in face] for face in corners]
+            uvs = [[int(one[1]) - 1 for one in face if len(one) > 1] for face in corners]
+            intact = [recording.faces.index(face) for face in faces if max(face) < count]
+            assert uvs[: len(intact)] == [recording.mesh["face_uvs"][index] for index in intact]
+        else:
+            points, faces = read_obj(file)
+        same(points[:count], recording.particles[recording.index(step), :, 0:3])
+        own = [face for face in faces if max(face) < count]
+        assert own == faces[: len(own)] == recording.intact_faces(step)
+        assert (len(faces) > len(own)) == (recording.collider_count > 0)
     return len(files)
 
 
@@ -186,12 +242,12 @@ def check_pc2(recording, path):
     same(positions, recording.particles[:, :, 0:3])
     points, faces = read_obj(Path(path).with_suffix(".obj"))
     same(points, positions[0])
-    assert faces == recording.triangles.tolist()
+    assert faces == recording.faces
     return int(head["samples"])
 
 
 def check_usda(recording, path):
-    from pxr import Usd, UsdGeom
+    from pxr import Usd, UsdGeom, UsdShade
 
     stage = Usd.Stage.Open(path)
     assert UsdGeom.GetStageUpAxis(stage) == "Y" and UsdGeom.GetStageMetersPerUnit(stage) == 1.0
@@ -204,10 +260,38 @@ def check_usda(recording, path):
         expected = recording.particles[recording.index(step)]
         same(np.array(mesh.GetPointsAttr().Get(step)), expected[:, 0:3])
         same(np.array(mesh.GetVelocitiesAttr().Get(step)), expected[:, 4:7])
-        corners = np.array(mesh.GetFaceVertexIndicesAttr().Get(step)).reshape(-1, 3)
-        assert corners.tolist() == recording.intact_triangles(step)
-        assert mesh.GetFaceVertexCountsAttr().Get(step) == [3] * len(corners)
+        faces = recording.intact_faces(step)
+        assert list(mesh.GetFaceVertexIndicesAttr().Get(step)) == sum(faces, [])
+        assert list(mesh.GetFaceVertexCountsAttr().Get(step)) == [len(face) for face in faces]
+        valid, reason = UsdGeom.Mesh.ValidateTopology(
+            mesh.GetFaceVertexIndicesAttr().Get(step), mesh.GetFaceVertexCountsAttr().Get(step), len(expected)
+        )
+        assert valid, reason
+    if recording.mesh:
+        check_subsets(recording, mesh, UsdGeom, UsdShade)
+    colliders = [prim for prim in stage.Traverse() if prim.GetName().startswith("collider_")]
+    assert len(colliders) == recording.collider_count
+    for prim in colliders:
+        UsdGeom.Xformable(prim).ComputeLocalToWorldTransform(recording.steps[-1])
     return len(recording.steps)
+
+
+def check_subsets(recording, mesh, usd_geom, usd_shade):
+    """Requires texture coordinates for each corner, and each face in the subsets of its group and material."""
+    step = recording.steps[-1]
+    faces = [recording.faces.index(face) for face in recording.intact_faces(step)]
+    uvs = usd_geom.PrimvarsAPI(mesh).GetPrimvar("st")
+    assert uvs.GetInterpolation() == usd_geom.Tokens.faceVarying
+    expected = [recording.mesh["uvs"][index] for face in faces for index in recording.mesh["face_uvs"][face]]
+    same(np.array(uvs.ComputeFlattened(step)), np.array(expected, "f4"))
+    for family, runs in (("groups", "groups"), ("materialBind", "materials")):
+        subsets = usd_geom.Subset.GetGeomSubsets(mesh, usd_geom.Tokens.face, family)
+        found = sorted(index for subset in subsets for index in subset.GetIndicesAttr().Get(step))
+        assert found == list(range(len(faces)))
+        assert len(subsets) == len({run["name"] for run in recording.mesh[runs]})
+    for subset in usd_geom.Subset.GetGeomSubsets(mesh, usd_geom.Tokens.face, "materialBind"):
+        material, _ = usd_shade.MaterialBindingAPI(subset.GetPrim()).ComputeBoundMaterial()
+        assert material.GetPrim().GetName() == subset.GetPrim().GetName().removeprefix("material_")
 
 
 def messages(path):

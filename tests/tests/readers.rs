@@ -262,8 +262,6 @@ fn a_foreign_process_that_floods_ready_and_restore_changes_nothing() {
 /// Records a curtain that is cut, with its forces, exports it in a format, and requires that the reader of another project
 /// finds `snapshot_count` snapshots with the recorded bits.
 fn assert_export_is_read(format: &str, target: &str, snapshot_count: u64) {
-    let sandbox = Sandbox::new();
-    let (file, target) = (sandbox.path("run.mcap"), sandbox.path(target));
     let lines = concat!(
         r#"{"step":20,"kind":"cut_radius","center":[0,1,0],"radius":0.15}"#,
         "\n",
@@ -271,15 +269,42 @@ fn assert_export_is_read(format: &str, target: &str, snapshot_count: u64) {
         "\n",
         r#"{"step":40,"kind":"mark","text":"gepinnt – ✓"}"#
     );
-    let commands = sandbox.write("cut.jsonl", lines);
-    let args =
-        ["simulate", "curtain", "--steps", "60", "--commands", &commands, "--forces", "-o", &file];
-    Process::run(Program::Recorder, &sandbox, &args).success();
+    assert_scene_is_read(&Sandbox::new(), ["curtain", lines], [format, target], snapshot_count);
+}
+
+fn assert_scene_is_read(
+    sandbox: &Sandbox,
+    [scene, commands]: [&str; 2],
+    [format, target]: [&str; 2],
+    snapshot_count: u64,
+) {
+    let (file, target) = (sandbox.path("run.mcap"), sandbox.path(target));
+    let commands = sandbox.write("cut.jsonl", commands);
+    let args = ["simulate", scene, "--steps", "60", "--commands", &commands, "--forces", "-o"];
+    let args = [&args[..], &[&file, "--overwrite"]].concat();
+    Process::run(Program::Recorder, sandbox, &args).success();
     let option = format!("--{format}");
-    Process::run(Program::Recorder, &sandbox, &["export", &file, &option, &target]).success();
-    let read = python(&sandbox, "read_export.py", &[format, &file, &target]);
+    Process::run(Program::Recorder, sandbox, &["export", &file, &option, &target]).success();
+    let read = python(sandbox, "read_export.py", &[format, &file, &target]);
     assert!(read["torn"].as_u64() > Some(5), "{read}");
     assert_eq!((&read["snapshots"], &read["recorded"]), (&json!(snapshot_count), &json!(61)));
+}
+
+#[test]
+#[ignore = "needs Python"]
+fn vtk_and_usd_read_the_quads_texture_coordinates_groups_and_materials_of_the_shirt_and_its_colliders()
+ {
+    let sandbox = Sandbox::new();
+    let mesh = sandbox.write("shirt.obj", include_str!("../../examples/shirt.obj"));
+    let args = ["import", &mesh, "--pin", "y > 1.45", "--bending", "1e-5"];
+    let scene = Process::run(Program::SimNode, &sandbox, &args).success();
+    let colliders = "[[collider]]\nshape = \"plane\"\nnormal = [0, 1, 0]\noffset = 0\n[[collider]]\n\
+        shape = \"capsule\"\na = [-1, 0.5, 0]\nb = [1, 0.6, 0]\nradius = 0.1\nvelocity = [0, 0, 1]\n";
+    let scene = sandbox.write("shirt.toml", &format!("{scene}{colliders}"));
+    let cut = r#"{"step":20,"kind":"cut_radius","center":[0,1.1,0.1],"radius":0.08}"#;
+    for (format, target) in [("vtk", "vtk"), ("obj", "obj"), ("usda", "run.usda")] {
+        assert_scene_is_read(&sandbox, [&scene, cut], [format, target], 61);
+    }
 }
 
 #[test]

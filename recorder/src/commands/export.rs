@@ -31,7 +31,7 @@ use crate::export::data::written_files::is_stdout;
 use crate::export::frame_names::FrameNames;
 use crate::export::pictures::target::Target;
 use crate::export::selection::{Choice, Moment, Selection, SnapshotRange};
-use crate::export::snapshots::OpenBytes;
+use crate::export::snapshots::{OpenBytes, Snapshots};
 use data::DataFormat;
 use format_args::{Format, FormatArgs};
 use pictures::Pace;
@@ -66,6 +66,7 @@ const FRAMES_PER_S_DEFAULT: u16 = 25;
     recorder export run.mcap --png pictures --every 100ms --view front --size 1280x720\n  \
     recorder export run.mcap --svg pictures --at 1s --at 1500ms --overwrite\n  \
     recorder export run.mcap --apng run.png --to 5s --size 480x360 --style shaded\n  \
+    recorder export run.mcap --usda run.usda --fps 25\n  \
     recorder export run.mcap --npz run.npz --from 2s --to 5s"
 )]
 pub(crate) struct ExportArgs {
@@ -89,7 +90,8 @@ pub(crate) struct ExportArgs {
     #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = parse::duration,
         group = "selection", conflicts_with_all = ["from", "to"])]
     at: Vec<Duration>,
-    /// Frames of an animation per second, 1 to 100 [default: 25]
+    /// Frames per second, 1 to 100. --apng shows so many of them [default: 25]; --obj, --vtk, --pc2 and
+    /// --usda have so many per second of simulated time, interpolated between the snapshots around them
     #[arg(long, value_name = "FPS", allow_hyphen_values = true, value_parser = frames_per_s)]
     fps: Option<u16>,
     /// Width and height of pictures in pixels, 16 to 8192 each [default: 960x720]
@@ -216,6 +218,8 @@ fn export<R: Read>(
         refused.map_or(Ok(()), Err)
     };
     let snapshots = survey.snapshots(steps, &visit, open_bytes);
+    let frames_per_s = args.fps.filter(|_| format.data().is_some_and(DataFormat::has_frames));
+    let snapshots = Snapshots { frames_per_s, ..snapshots };
     let existing = args.overwrite.existing();
     match *format {
         Format::Pictures(format, folder) => {
@@ -249,6 +253,7 @@ impl ExportArgs {
             _ if !self.at.is_empty() => Choice::At(self.at.clone()),
             _ if matches!(format, Format::Pictures(..)) => Choice::Spread(FRAMES_DEFAULT),
             _ if matches!(format, Format::Animation(_)) => Choice::Every(self.frame_time()),
+            _ if self.fps.is_some() => Choice::All,
             _ if format.data() == Some(DataFormat::Foxglove) => Choice::Every(SCENE_PERIOD),
             _ => Choice::All,
         };
@@ -281,22 +286,31 @@ impl ExportArgs {
     fn check(&self) -> Result<(), clap::Error> {
         let Some(format) = self.format.format() else { return Ok(()) };
         let is_picture = format.data().is_none();
+        let has_frames = format.data().is_some_and(DataFormat::has_frames);
         let of_pictures = "pictures (--png, --svg, --apng)";
+        let of_frames = "--apng, --obj, --vtk, --pc2 and --usda";
+        let takes_fps = has_frames || matches!(format, Format::Animation(_));
         let ignored = [
-            ("--fps", self.fps.is_some() && !matches!(format, Format::Animation(_)), "--apng"),
+            ("--fps", self.fps.is_some() && !takes_fps, of_frames),
             ("--size", self.size.is_some() && !is_picture, of_pictures),
             ("--view", self.view.is_some() && !is_picture, of_pictures),
             ("--style", self.style.is_some() && !is_picture, of_pictures),
             ("--no-bend", self.no_bend && !is_picture, of_pictures),
             ("--no-bend", self.no_bend && self.style == Some(StyleArg::Shaded), "--style wires"),
         ];
-        match ignored.into_iter().find(|(_, is_ignored, _)| *is_ignored) {
-            None => Ok(()),
-            Some((option, _, formats)) => Err(clap::Error::raw(
-                ErrorKind::ArgumentConflict,
-                format!("{option} has an effect only on {formats}: remove it\n"),
-            )),
+        let conflict =
+            |text: String| Err(clap::Error::raw(ErrorKind::ArgumentConflict, format!("{text}\n")));
+        if let Some((option, _, formats)) =
+            ignored.into_iter().find(|(_, is_ignored, _)| *is_ignored)
+        {
+            return conflict(format!("{option} has an effect only on {formats}: remove it"));
         }
+        let selects = self.every.is_some() || self.frames.is_some() || !self.at.is_empty();
+        if has_frames && self.fps.is_some() && selects {
+            let text = "--fps selects the frames of this format: remove --every, --frames and --at";
+            return conflict(text.to_owned());
+        }
+        Ok(())
     }
 }
 

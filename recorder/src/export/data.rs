@@ -1,6 +1,8 @@
 //! Writes states as numbers and meshes for other programs.
 
+mod colliders;
 pub(crate) mod csv;
+mod faces;
 pub(crate) mod foxglove;
 pub(crate) mod npz;
 pub(crate) mod obj;

@@ -5,6 +5,7 @@ use std::ops::ControlFlow;
 
 use anyhow::bail;
 use recorder::{OutcomeRow, RunDescription, SceneState};
+use sim_solver::Scene;
 use sim_solver::scene::Up;
 
 /// Visits the states of the selected snapshots in their order, until the visitor breaks.
@@ -17,6 +18,8 @@ pub(crate) type OpenBytes<'a> = dyn Fn() -> std::io::Result<Box<dyn Read>> + 'a;
 /// The selected snapshots. Only one state at a time is in memory.
 pub(crate) struct Snapshots<'a> {
     pub(crate) run: &'a RunDescription,
+    /// The scene, unless it cannot be read.
+    pub(crate) scene: Option<&'a Scene>,
     /// Axis of the scene that points up.
     pub(crate) up: Up,
     /// The scene has two dimensions.
@@ -27,6 +30,8 @@ pub(crate) struct Snapshots<'a> {
     pub(crate) steps: &'a [u64],
     /// Number of particles of each snapshot.
     pub(crate) particle_count: usize,
+    /// Exports evenly spaced frames in place of the snapshots, this many per second of simulated time.
+    pub(crate) frames_per_s: Option<u16>,
     pub(crate) visit: &'a VisitStates<'a>,
     /// Opens the file itself, up to the end of its readable part.
     pub(crate) open_bytes: &'a OpenBytes<'a>,

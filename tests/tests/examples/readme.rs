@@ -109,17 +109,12 @@ fn the_path_for_robotics_grabs_records_proves_and_compares() {
 #[test]
 fn the_path_for_games_brings_a_mesh_in_and_out() {
     let path = TenMinutes::new("games and effects");
-    // A square of 11 x 11 vertices between y = 0.5 and 1.5.
-    let vertices = (0..121).map(|index| {
-        let (column, row) = (f64::from(index % 11), f64::from(index / 11));
-        format!("v {} {} 0\n", 0.1 * column, 0.5 + 0.1 * row)
-    });
-    let faces = (1..110).filter(|corner| corner % 11 != 0).map(|a| {
-        let [b, c, d] = [a + 1, a + 11, a + 12];
-        format!("f {a} {b} {d}\nf {a} {d} {c}\n")
-    });
-    path.sandbox.write("shirt.obj", &vertices.chain(faces).collect::<String>());
-    path.run();
+    std::fs::create_dir(path.sandbox.path("examples")).unwrap();
+    path.sandbox.write("examples/shirt.obj", include_str!("../../../examples/shirt.obj"));
+    let done = path.run();
+    let frames = printed(&done, "recorder export shirt.mcap --pc2");
+    assert!(frames.contains(" frames at 25 per second "), "{frames}");
+    assert!(frames.contains(" interpolated between snapshots"), "{frames}");
 }
 
 #[test]

@@ -25,6 +25,11 @@ pub(super) enum DataFormat {
 }
 
 impl DataFormat {
+    /// Returns `true` if a frame rate can select moments between the snapshots.
+    pub(super) fn has_frames(self) -> bool {
+        matches!(self, Self::Vtk | Self::Obj | Self::Pc2 | Self::Usda)
+    }
+
     /// Returns the extensions of the file; none for a folder.
     pub(super) fn extensions(self) -> &'static [&'static str] {
         match self {
@@ -47,6 +52,17 @@ pub(super) struct Written {
     snapshot_count: usize,
     first_step: u64,
     last_step: u64,
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    frames: Option<Resampling>,
+}
+
+/// The frames of a frame rate.
+#[derive(Debug, Serialize)]
+struct Resampling {
+    frames_per_s: u16,
+    frame_count: usize,
+    /// Frames that lie between two snapshots.
+    interpolated_count: usize,
 }
 
 /// Writes the files of a format. After an error, none of them is left.
@@ -92,14 +108,30 @@ impl Written {
             snapshot_count: snapshots.steps.len(),
             first_step: snapshots.steps.first().copied().unwrap_or_default(),
             last_step: snapshots.steps.last().copied().unwrap_or_default(),
+            frames: snapshots.frames_per_s.map(|frames_per_s| Resampling {
+                frames_per_s,
+                frame_count: snapshots.frame_numbers().len(),
+                interpolated_count: snapshots.interpolated_count(),
+            }),
         }
     }
 }
 
 impl fmt::Display for Written {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { target, snapshot_count, first_step, last_step, .. } = self;
-        let snapshots = counted(*snapshot_count as u64, "snapshot");
-        write!(f, "{target}: {snapshots} (steps {first_step}..={last_step})")
+        let Self { target, snapshot_count, first_step, last_step, frames, .. } = self;
+        let Some(Resampling { frames_per_s, frame_count, interpolated_count }) = frames else {
+            let snapshots = counted(*snapshot_count as u64, "snapshot");
+            return write!(f, "{target}: {snapshots} (steps {first_step}..={last_step})");
+        };
+        let frames = counted(*frame_count as u64, "frame");
+        let source = match interpolated_count {
+            0 => "each a snapshot".to_owned(),
+            count => format!("{count} interpolated between snapshots"),
+        };
+        write!(
+            f,
+            "{target}: {frames} at {frames_per_s} per second (steps {first_step}..={last_step}), {source}"
+        )
     }
 }

@@ -27,17 +27,17 @@ pub(super) struct FormatArgs {
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
     /// Write VTP files and a PVD file with their times into this folder, for ParaView: velocity,
-    /// inverse mass and flags of particles, stretch of untorn constraints, intact triangles
+    /// inverse mass and flags of particles, stretch of untorn constraints, intact faces, colliders
     #[arg(long, value_name = "DIR")]
     vtk: Option<PathBuf>,
-    /// Write OBJ files named `NAME_STEP.obj` into this folder: intact triangles, or else untorn
-    /// constraints as lines
+    /// Write OBJ files named `NAME_STEP.obj` into this folder: intact faces as the mesh had them, or else
+    /// untorn constraints as lines, and colliders
     #[arg(long, value_name = "DIR")]
     obj: Option<PathBuf>,
     /// Write a cache of positions for Blender's Mesh Cache, and FILE.obj, the mesh that it moves
     #[arg(long, value_name = "FILE.pc2")]
     pc2: Option<PathBuf>,
-    /// Write a USD stage whose time codes are steps. Its `upAxis` is the scene's; a scene with -y up is
+    /// Write a USD stage whose time codes are steps, or frames of --fps. Its `upAxis` is the scene's; a scene with -y up is
     /// turned by its transform
     #[arg(long, value_name = "FILE")]
     usda: Option<PathBuf>,

@@ -79,11 +79,13 @@ impl Survey {
         let scene = self.scene.as_ref().ok();
         Snapshots {
             run: &self.run,
+            scene,
             up: scene.map_or(Up::Y, |scene| scene.up),
             is_2d: scene.is_some_and(|scene| scene.dimensions == 2),
             first_step: self.steps.first().copied().unwrap_or_default(),
             steps,
             particle_count: self.particle_count,
+            frames_per_s: None,
             visit,
             open_bytes,
         }

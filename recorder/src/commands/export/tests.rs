@@ -18,7 +18,6 @@ use sim_contract::{ConstraintState, ParticleFlags, ParticleState, Triangle};
 use sim_solver::{Scene, Solver};
 
 use super::*;
-use crate::export::snapshots::Snapshots;
 
 /// A square of cloth in front of a sphere and above a floor, with a pinned particle at its side.
 const TINY: &str = r#"
@@ -79,6 +78,19 @@ fn record_with_text(scene: &str, steps: u64, text: &str) -> Vec<u8> {
     let run = job.description(&solver);
     let options = LogOptions { chunk_size_bytes: 2000, ..LogOptions::default() };
     let mut log = LogWriter::create(Vec::new(), options, &run, text.as_bytes(), 0).unwrap();
+    simulate(&job, States::first(solver), Some(&mut log), &AtomicBool::new(false), |_| {}).unwrap();
+    log.finish(&Closing::default()).unwrap()
+}
+
+/// Records a scene with commands from a file.
+fn record_commands(scene: &str, commands: &str, steps: u64) -> Vec<u8> {
+    let scene = Scene::from_toml(scene, "test").unwrap();
+    let commands = recorder::parse_commands(commands, "test").unwrap();
+    let job = Job::new(scene, commands, steps);
+    let solver = Solver::new(&job.scene);
+    let (run, toml) = (job.description(&solver), job.scene.to_toml());
+    let options = LogOptions::default();
+    let mut log = LogWriter::create(Vec::new(), options, &run, toml.as_bytes(), 0).unwrap();
     simulate(&job, States::first(solver), Some(&mut log), &AtomicBool::new(false), |_| {}).unwrap();
     log.finish(&Closing::default()).unwrap()
 }
@@ -326,15 +338,7 @@ fn lines_behind_a_triangle_are_hidden_and_lines_on_it_are_not() {
 fn a_reset_restores_torn_constraints() {
     let reset = r#"{"step":10,"kind":"cut","constraint":0}
         {"step":20,"kind":"reset"}"#;
-    let scene = Scene::from_toml(TINY, "test").unwrap();
-    let commands = recorder::parse_commands(reset, "test").unwrap();
-    let job = Job::new(scene, commands, 30);
-    let solver = Solver::new(&job.scene);
-    let (run, toml) = (job.description(&solver), job.scene.to_toml());
-    let options = LogOptions::default();
-    let mut log = LogWriter::create(Vec::new(), options, &run, toml.as_bytes(), 0).unwrap();
-    simulate(&job, States::first(solver), Some(&mut log), &AtomicBool::new(false), |_| {}).unwrap();
-    let file = log.finish(&Closing::default()).unwrap();
+    let file = record_commands(TINY, reset, 30);
     let lines: Vec<_> =
         pictures(&file, &[9, 10, 19, 20], OPTIONS).iter().map(|one| counts(one)[1]).collect();
     assert_eq!(lines, [8, 7, 7, 8]);
@@ -419,8 +423,11 @@ fn the_error_names_a_wrong_option() {
 #[test]
 fn an_option_that_the_format_ignores_is_refused() {
     for (line, refused) in [
-        ("a.mcap --png d --fps 30", Some("--fps has an effect only on --apng")),
+        ("a.mcap --png d --fps 30", Some("--fps has an effect only on --apng, --obj, --vtk")),
         ("a.mcap --npz f --fps 30", Some("--fps")),
+        ("a.mcap --usda f --fps 30", None),
+        ("a.mcap --usda f --fps 30 --every 1s", Some("remove --every, --frames and --at")),
+        ("a.mcap --obj f --fps 30 --at 1s", Some("--fps selects the frames")),
         ("a.mcap --npz f --size 20x30", Some("--size has an effect only on pictures")),
         ("a.mcap --obj d --view top", Some("--view")),
         ("a.mcap --obj d --no-bend", Some("--no-bend")),

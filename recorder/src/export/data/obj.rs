@@ -1,42 +1,119 @@
-//! Wavefront OBJ: the particles as vertices in their order, and the triangles, or else the constraints.
+//! Wavefront OBJ: the particles as vertices in their order, and the faces, or else the constraints. The
+//! colliders follow as objects of their own.
 
-use std::fmt::Write;
+use std::fmt::{self, Write};
 use std::path::Path;
 
+use super::colliders::{Colliders, Solid};
+use super::faces::{Face, Faces};
 use super::written_files::WrittenFiles;
 use crate::export::frame_names::FrameNames;
+use crate::export::frames::Frame;
 use crate::export::snapshots::Snapshots;
 use recorder::SceneState;
 
-/// Writes a file per snapshot into `folder`.
+/// Writes a file per frame into `folder`.
 pub(crate) fn write(
     snapshots: &Snapshots<'_>,
     folder: &Path,
     files: &mut WrittenFiles,
 ) -> anyhow::Result<()> {
     let names = FrameNames::new(folder, &snapshots.run.scene_name, "obj");
-    names.prepare(snapshots.steps, files.existing())?;
+    names.prepare(&snapshots.frame_numbers(), files.existing())?;
     names.remove_older(files.existing())?;
-    snapshots
-        .for_each(|state| files.add_whole(&names.path(state.row.step), mesh(state)?.as_bytes()))
+    let (faces, colliders) = (Faces::of(snapshots)?, Colliders::of(snapshots)?);
+    snapshots.for_each_frame(|frame| {
+        let mut text = title(frame, snapshots.frames_per_s.is_some());
+        write_mesh(&mut text, frame.state, &faces)?;
+        if let Some(colliders) = &colliders {
+            write_colliders(&mut text, frame.state, colliders)?;
+        }
+        files.add_whole(&names.path(frame.number), text.as_bytes())
+    })
 }
 
-/// Returns the file of a state. A scene without triangles has a line for each untorn constraint. Indices
-/// count from 1.
-pub(super) fn mesh(state: &SceneState) -> Result<String, std::fmt::Error> {
-    let mut text = String::new();
-    writeln!(text, "# step {}", state.row.step)?;
+/// Returns the comment that says which moment a file shows.
+fn title(frame: &Frame<'_>, is_grid: bool) -> String {
+    let Frame { number, time_s, is_interpolated, state } = frame;
+    let step = state.row.step;
+    match (is_grid, is_interpolated) {
+        (false, _) => format!("# step {step}\n"),
+        (true, false) => format!("# frame {number} at {time_s:.6} s: step {step}\n"),
+        (true, true) => {
+            format!("# frame {number} at {time_s:.6} s: interpolated between snapshots\n")
+        }
+    }
+}
+
+/// Returns the file of a state without colliders.
+pub(super) fn mesh(state: &SceneState, faces: &Faces) -> Result<String, fmt::Error> {
+    let mut text = format!("# step {}\n", state.row.step);
+    write_mesh(&mut text, state, faces)?;
+    Ok(text)
+}
+
+/// Writes the particles and the intact faces. A scene without faces has a line for each untorn constraint.
+/// Indices count from 1.
+fn write_mesh(text: &mut String, state: &SceneState, faces: &Faces) -> fmt::Result {
     for particle in &state.particles {
         let [x, y, z] = particle.position;
         writeln!(text, "v {x:?} {y:?} {z:?}")?;
     }
-    for (_, [a, b, c]) in state.intact_triangles() {
-        writeln!(text, "f {} {} {}", a + 1, b + 1, c + 1)?;
+    for [u, v] in &faces.uvs {
+        writeln!(text, "vt {u:?} {v:?}")?;
     }
-    if state.triangles.is_empty() {
+    let (mut group, mut material) = (None, None);
+    for index in faces.intact(state) {
+        let face = &faces.all[index as usize];
+        if face.group != group {
+            let name = face.group.map_or("", |group| &faces.groups[group as usize]);
+            writeln!(text, "{}", format!("g {name}").trim_end())?;
+            group = face.group;
+        }
+        if face.material != material {
+            let name = face.material.map_or("none", |one| &faces.materials[one as usize]);
+            writeln!(text, "usemtl {name}")?;
+            material = face.material;
+        }
+        write_face(text, face)?;
+    }
+    if faces.all.is_empty() {
         for constraint in state.untorn_constraints() {
             writeln!(text, "l {} {}", constraint.a + 1, constraint.b + 1)?;
         }
     }
-    Ok(text)
+    Ok(())
+}
+
+fn write_face(text: &mut String, face: &Face) -> fmt::Result {
+    text.push('f');
+    for (place, corner) in face.corners.iter().enumerate() {
+        match face.uvs.get(place) {
+            Some(uv) => write!(text, " {}/{}", corner + 1, uv + 1)?,
+            None => write!(text, " {}", corner + 1)?,
+        }
+    }
+    writeln!(text)
+}
+
+/// Writes each collider as an object, a group and a material, because the ones before would go on.
+fn write_colliders(text: &mut String, state: &SceneState, colliders: &Colliders) -> fmt::Result {
+    let mut vertex_count = state.particles.len();
+    for (index, Solid { vertices, faces }, pose) in colliders.solids(state) {
+        let name = Colliders::name(index);
+        writeln!(text, "o {name}\ng {name}\nusemtl collider")?;
+        for vertex in &vertices {
+            let [x, y, z] = pose.apply(*vertex).as_vec3().to_array();
+            writeln!(text, "v {x:?} {y:?} {z:?}")?;
+        }
+        for face in &faces {
+            let corners: Vec<_> = face
+                .iter()
+                .map(|corner| (vertex_count + *corner as usize + 1).to_string())
+                .collect();
+            writeln!(text, "f {}", corners.join(" "))?;
+        }
+        vertex_count += vertices.len();
+    }
+    Ok(())
 }

@@ -5,15 +5,16 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 
+use super::faces::Faces;
 use super::obj;
 use super::written_files::WrittenFiles;
 use crate::export::snapshots::Snapshots;
 
 const MAGIC: &[u8; 12] = b"POINTCACHE2\0";
 const VERSION: i32 = 1;
-/// The number of the frame of the first snapshot, and the frames from one snapshot to the next.
+/// The number of the first frame in the animation, and the frames of the animation from one to the next.
 const FIRST_FRAME: f32 = 0.0;
-const FRAMES_PER_SNAPSHOT: f32 = 1.0;
+const FRAMES_PER_SAMPLE: f32 = 1.0;
 
 /// Writes the cache, and the mesh of the first snapshot beside it. Both have the particles in their order.
 pub(crate) fn write(
@@ -24,7 +25,7 @@ pub(crate) fn write(
     let mesh_path = mesh_path(path)?;
     files.existing().check(&mesh_path)?;
     files.add_streamed(path, |out| write_cache(snapshots, out))?;
-    files.add_whole(&mesh_path, obj::mesh(&snapshots.first()?)?.as_bytes())
+    files.add_whole(&mesh_path, obj::mesh(&snapshots.first()?, &Faces::of(snapshots)?)?.as_bytes())
 }
 
 /// Returns the path of the mesh: that of the cache with the extension `obj`.
@@ -42,10 +43,10 @@ fn write_cache(snapshots: &Snapshots<'_>, out: &mut dyn Write) -> anyhow::Result
     out.write_all(&VERSION.to_le_bytes())?;
     out.write_all(&count(snapshots.particle_count)?.to_le_bytes())?;
     out.write_all(&FIRST_FRAME.to_le_bytes())?;
-    out.write_all(&FRAMES_PER_SNAPSHOT.to_le_bytes())?;
-    out.write_all(&count(snapshots.steps.len())?.to_le_bytes())?;
-    snapshots.for_each(|state| {
-        for particle in &state.particles {
+    out.write_all(&FRAMES_PER_SAMPLE.to_le_bytes())?;
+    out.write_all(&count(snapshots.frame_numbers().len())?.to_le_bytes())?;
+    snapshots.for_each_frame(|frame| {
+        for particle in &frame.state.particles {
             out.write_all(bytemuck::bytes_of(&particle.position))?;
         }
         Ok(())

@@ -38,14 +38,15 @@ pub(super) struct PolyData {
 }
 
 impl PolyData {
-    /// Begins the file of a state at a time, in seconds.
-    pub(super) fn new(counts: PolyDataCounts, time_s: f64) -> Self {
+    /// Begins the file of a state at a time, in seconds. The lists of names belong to the whole file.
+    pub(super) fn new(counts: PolyDataCounts, time_s: f64, names: &[(&str, &[String])]) -> Self {
         let PolyDataCounts { points, vertices, lines, polygons } = counts;
+        let names: String = names.iter().map(|(list, names)| name_array(list, names)).collect();
         let xml = format!(
             "<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" version=\"1.0\" \
              byte_order=\"LittleEndian\" header_type=\"UInt64\">\n<PolyData>\n\
              <FieldData><DataArray type=\"Float64\" Name=\"TimeValue\" NumberOfTuples=\"1\" \
-             format=\"ascii\">{time_s:?}</DataArray></FieldData>\n\
+             format=\"ascii\">{time_s:?}</DataArray>{names}</FieldData>\n\
              <Piece NumberOfPoints=\"{points}\" NumberOfVerts=\"{vertices}\" \
              NumberOfLines=\"{lines}\" NumberOfStrips=\"0\" NumberOfPolys=\"{polygons}\">\n"
         );
@@ -79,11 +80,14 @@ impl PolyData {
         self.appended.extend_from_slice(bytes);
     }
 
-    /// Adds a section with cells of N points each.
-    pub(super) fn add_cells<const N: usize>(&mut self, section: &str, cells: &[[u32; N]]) {
-        let points: Vec<i64> = cells.as_flattened().iter().copied().map(i64::from).collect();
-        // The last cell ends at the number of points, which is below 2^63.
-        let ends: Vec<u64> = (1..=cells.len()).map(|count| (count * N) as u64).collect();
+    /// Adds a section with cells of any number of points.
+    pub(super) fn add_cells<'a>(&mut self, section: &str, cells: impl Iterator<Item = &'a [u32]>) {
+        let (mut points, mut ends) = (Vec::<i64>::new(), Vec::<u64>::new());
+        for cell in cells {
+            points.extend(cell.iter().copied().map(i64::from));
+            // A cell ends at the number of points, which is below 2^63.
+            ends.push(points.len() as u64);
+        }
         self.begin(section);
         self.add_array("connectivity", NumberType::Int64, 1, bytemuck::cast_slice(&points));
         self.add_array("offsets", NumberType::Int64, 1, bytemuck::cast_slice(&ends));
@@ -99,4 +103,18 @@ impl PolyData {
         file.extend_from_slice(b"\n</AppendedData>\n</VTKFile>\n");
         file
     }
+}
+
+/// Returns a list of texts: the numbers of their bytes, with a zero behind each text.
+fn name_array(list: &str, names: &[String]) -> String {
+    if names.is_empty() {
+        return String::new();
+    }
+    let bytes = names.iter().flat_map(|name| name.bytes().chain([0]));
+    let bytes: Vec<_> = bytes.map(|byte| byte.to_string()).collect();
+    format!(
+        "<Array type=\"String\" Name=\"{list}\" NumberOfTuples=\"{}\" format=\"ascii\">{}</Array>",
+        names.len(),
+        bytes.join(" ")
+    )
 }

@@ -1,7 +1,8 @@
-//! USD as text: one mesh or set of points whose positions and velocities are sampled at each snapshot.
+//! USD as text: one mesh or set of points whose positions and velocities are sampled at each frame, and a
+//! mesh for each collider.
 //!
-//! Time codes are steps, so every sample has an exact time. USD knows y up and z up. A scene with -y up
-//! gets half a turn about x instead, which leaves its coordinates unchanged.
+//! Time codes are steps, or frames of a frame rate, so every sample has an exact time. USD knows y up and z
+//! up. A scene with -y up gets half a turn about x instead, which leaves its coordinates unchanged.
 
 use std::fmt::{self, Display};
 use std::io::Write;
@@ -9,25 +10,33 @@ use std::io::Write;
 use sim_contract::ParticleState;
 use sim_solver::scene::Up;
 
+use super::colliders::{Colliders, Pose};
+use super::faces::{Face, Faces};
 use crate::export::snapshots::Snapshots;
 
 /// Writes the stage. An attribute lists all its samples, so each of them reads the recording once.
 pub(crate) fn write(snapshots: &Snapshots<'_>, out: &mut dyn Write) -> anyhow::Result<()> {
+    let faces = Faces::of(snapshots)?;
     write_header(snapshots, out)?;
-    let is_mesh = !snapshots.first()?.triangles.is_empty();
-    writeln!(out, "    def {} \"particles\"\n    {{", if is_mesh { "Mesh" } else { "Points" })?;
+    let kind = if faces.all.is_empty() { "Points" } else { "Mesh" };
+    writeln!(out, "    def {kind} \"particles\"\n    {{")?;
     write_samples(snapshots, out, "point3f[] points", |particle| particle.position)?;
     write_samples(snapshots, out, "vector3f[] velocities", |particle| particle.velocity)?;
-    if is_mesh {
-        // The triangles are the surface, not the cage of a smooth one.
-        writeln!(out, "        uniform token subdivisionScheme = \"none\"")?;
-        writeln!(out, "        uniform bool doubleSided = 1")?;
-        let corner_counts = |triangles: &[[u32; 3]]| vec![3; triangles.len()];
-        write_triangles(snapshots, out, "int[] faceVertexCounts", corner_counts)?;
-        let corners = |triangles: &[[u32; 3]]| triangles.as_flattened().to_vec();
-        write_triangles(snapshots, out, "int[] faceVertexIndices", corners)?;
+    if !faces.all.is_empty() {
+        write_faces(&FaceHistory::of(snapshots, &faces)?, out)?;
     }
-    writeln!(out, "    }}\n}}")?;
+    writeln!(out, "    }}")?;
+    if !faces.materials.is_empty() {
+        writeln!(out, "    def Scope \"materials\"\n    {{")?;
+        for name in identifiers(&faces.materials) {
+            writeln!(out, "        def Material \"{name}\"\n        {{\n        }}")?;
+        }
+        writeln!(out, "    }}")?;
+    }
+    if let Some(colliders) = Colliders::of(snapshots)? {
+        write_colliders(snapshots, out, &colliders)?;
+    }
+    writeln!(out, "}}")?;
     Ok(())
 }
 
@@ -40,13 +49,24 @@ fn write_header(snapshots: &Snapshots<'_>, out: &mut dyn Write) -> anyhow::Resul
         ),
         Up::Z => ("Z", ""),
     };
-    let rate_hz = snapshots.run.rate_hz;
-    let (first, last) = (snapshots.steps[0], snapshots.steps[snapshots.steps.len() - 1]);
+    let rate = snapshots.time_codes_per_s();
+    let numbers = snapshots.frame_numbers();
+    let (first, last) = (numbers[0], numbers[numbers.len() - 1]);
+    writeln!(out, "#usda 1.0\n(\n    defaultPrim = \"scene\"")?;
+    if snapshots.frames_per_s.is_some() {
+        let (interpolated, count) = (snapshots.interpolated_count(), numbers.len());
+        let start_s = snapshots.frame_time_s(first);
+        writeln!(
+            out,
+            "    doc = \"Time code 0 is {start_s:.6} s of the run; {interpolated} of {count} frames are \
+             interpolated between snapshots\""
+        )?;
+    }
     write!(
         out,
-        "#usda 1.0\n(\n    defaultPrim = \"scene\"\n    upAxis = \"{up_axis}\"\n    metersPerUnit = 1\n    \
-         timeCodesPerSecond = {rate_hz}\n    framesPerSecond = {rate_hz}\n    startTimeCode = {first}\n    \
-         endTimeCode = {last}\n)\n\ndef Xform \"scene\"\n{{\n{turn}"
+        "    upAxis = \"{up_axis}\"\n    metersPerUnit = 1\n    timeCodesPerSecond = {rate}\n    \
+         framesPerSecond = {rate}\n    startTimeCode = {first}\n    endTimeCode = {last}\n)\n\n\
+         def Xform \"scene\"\n{{\n{turn}"
     )?;
     Ok(())
 }
@@ -59,37 +79,222 @@ fn write_samples(
     value: impl Fn(&ParticleState) -> [f32; 3],
 ) -> anyhow::Result<()> {
     writeln!(out, "        {attribute}.timeSamples = {{")?;
-    snapshots.for_each(|state| {
-        write!(out, "            {}: ", state.row.step)?;
-        Ok(write_list(out, state.particles.iter().map(|one| Tuple(value(one))))?)
+    snapshots.for_each_frame(|frame| {
+        write!(out, "            {}: ", frame.number)?;
+        write_list(out, frame.state.particles.iter().map(|one| Tuple(value(one))))?;
+        Ok(writeln!(out, ",")?)
     })?;
     writeln!(out, "        }}")?;
     Ok(())
 }
 
-/// Writes an attribute of the intact triangles, with a sample for each change of them.
-fn write_triangles<T: Display>(
+/// The intact faces over time.
+struct FaceHistory<'a> {
+    faces: &'a Faces,
+    /// By change: the number of its frame, and the faces that appear or disappear.
+    changes: Vec<(u64, Vec<u32>)>,
+}
+
+impl<'a> FaceHistory<'a> {
+    fn of(snapshots: &Snapshots<'_>, faces: &'a Faces) -> anyhow::Result<Self> {
+        let mut is_intact = vec![false; faces.all.len()];
+        let mut changes = Vec::new();
+        snapshots.for_each_frame(|frame| {
+            let mut now = vec![false; is_intact.len()];
+            for index in faces.intact(frame.state) {
+                now[index as usize] = true;
+            }
+            let changed = (0_u32..).zip(now.iter().zip(&is_intact));
+            let changed: Vec<_> = changed
+                .filter(|(_, (now, before))| now != before)
+                .map(|(index, _)| index)
+                .collect();
+            if !changed.is_empty() || changes.is_empty() {
+                changes.push((frame.number, changed));
+            }
+            is_intact = now;
+            Ok(())
+        })?;
+        Ok(Self { faces, changes })
+    }
+
+    /// Writes an attribute, with a sample for each change, or one value without any.
+    fn write<T: Display>(
+        &self,
+        out: &mut dyn Write,
+        attribute: &str,
+        values: impl Fn(&[&Face]) -> Vec<T>,
+    ) -> std::io::Result<()> {
+        let mut is_intact = vec![false; self.faces.all.len()];
+        let is_static = self.changes.len() == 1;
+        if !is_static {
+            writeln!(out, "        {attribute}.timeSamples = {{")?;
+        }
+        for (number, changed) in &self.changes {
+            for index in changed {
+                is_intact[*index as usize] ^= true;
+            }
+            let faces = self.faces.all.iter().zip(&is_intact);
+            let faces: Vec<_> = faces.filter(|(_, is)| **is).map(|(face, _)| face).collect();
+            if is_static {
+                write!(out, "        {attribute} = ")?;
+            } else {
+                write!(out, "            {number}: ")?;
+            }
+            write_list(out, values(&faces).into_iter())?;
+            writeln!(out, "{}", if is_static { "" } else { "," })?;
+        }
+        if !is_static {
+            writeln!(out, "        }}")?;
+        }
+        Ok(())
+    }
+}
+
+/// Writes the faces, their texture coordinates, and the subsets of their groups and materials.
+fn write_faces(history: &FaceHistory<'_>, out: &mut dyn Write) -> anyhow::Result<()> {
+    let faces = history.faces;
+    // The faces are the surface, not the cage of a smooth one.
+    writeln!(out, "        uniform token subdivisionScheme = \"none\"")?;
+    writeln!(out, "        uniform bool doubleSided = 1")?;
+    let corner_counts = |faces: &[&Face]| faces.iter().map(|face| face.corners.len()).collect();
+    history.write(out, "int[] faceVertexCounts", corner_counts)?;
+    let corners =
+        |faces: &[&Face]| faces.iter().flat_map(|face| face.corners.iter().copied()).collect();
+    history.write(out, "int[] faceVertexIndices", corners)?;
+    if !faces.uvs.is_empty() {
+        // Every corner needs an index: the last pair is for the corners without texture coordinates.
+        write!(out, "        texCoord2f[] primvars:st = ")?;
+        write_list(out, faces.uvs.iter().chain([&[0.0; 2]]).map(|uv| Tuple(*uv)))?;
+        writeln!(out, " (\n            interpolation = \"faceVarying\"\n        )")?;
+        let none = u32::try_from(faces.uvs.len()).unwrap_or(u32::MAX);
+        let of_face = |face: &&Face| match face.uvs.as_slice() {
+            [] => vec![none; face.corners.len()],
+            uvs => uvs.to_vec(),
+        };
+        let uvs = |faces: &[&Face]| faces.iter().flat_map(of_face).collect();
+        history.write(out, "int[] primvars:st:indices", uvs)?;
+    }
+    if !faces.materials.is_empty() {
+        let family = "subsetFamily:materialBind:familyType";
+        writeln!(out, "        uniform token {family} = \"nonOverlapping\"")?;
+    }
+    for (number, name) in (0..).zip(identifiers(&faces.groups)) {
+        let subset = Subset { name: &format!("group_{name}"), family: "groups", material: None };
+        subset.write(history, out, |face| face.group == Some(number))?;
+    }
+    for (number, name) in (0..).zip(identifiers(&faces.materials)) {
+        let (subset_name, material) = (format!("material_{name}"), Some(name.as_str()));
+        let subset = Subset { name: &subset_name, family: "materialBind", material };
+        subset.write(history, out, |face| face.material == Some(number))?;
+    }
+    Ok(())
+}
+
+/// A subset of the faces.
+struct Subset<'a> {
+    name: &'a str,
+    family: &'a str,
+    material: Option<&'a str>,
+}
+
+impl Subset<'_> {
+    fn write(
+        &self,
+        history: &FaceHistory<'_>,
+        out: &mut dyn Write,
+        contains: impl Fn(&Face) -> bool,
+    ) -> std::io::Result<()> {
+        let Self { name, family, material } = self;
+        let schema = match material {
+            Some(_) => " (\n            prepend apiSchemas = [\"MaterialBindingAPI\"]\n        )",
+            None => "",
+        };
+        writeln!(out, "        def GeomSubset \"{name}\"{schema}\n        {{")?;
+        writeln!(out, "        uniform token elementType = \"face\"")?;
+        writeln!(out, "        uniform token familyName = \"{family}\"")?;
+        if let Some(material) = material {
+            writeln!(out, "        rel material:binding = </scene/materials/{material}>")?;
+        }
+        history.write(out, "int[] indices", |faces| {
+            let places = faces.iter().enumerate().filter(|(_, face)| contains(face));
+            places.map(|(place, _)| place).collect()
+        })?;
+        writeln!(out, "        }}")
+    }
+}
+
+/// Returns different names of prims for names of any form.
+fn identifiers(names: &[String]) -> Vec<String> {
+    let mut identifiers: Vec<String> = Vec::with_capacity(names.len());
+    for (number, name) in names.iter().enumerate() {
+        let letter = |one: char| if one.is_ascii_alphanumeric() { one } else { '_' };
+        let mut identifier: String = name.chars().map(letter).collect();
+        if identifier.starts_with(|first: char| first.is_ascii_digit()) {
+            identifier.insert(0, '_');
+        }
+        if identifiers.contains(&identifier) {
+            identifier = format!("{identifier}_{number}");
+        }
+        identifiers.push(identifier);
+    }
+    identifiers
+}
+
+/// Writes the meshes of the colliders, which keep the form of the first frame, and their poses.
+fn write_colliders(
     snapshots: &Snapshots<'_>,
     out: &mut dyn Write,
-    attribute: &str,
-    values: impl Fn(&[[u32; 3]]) -> Vec<T>,
+    colliders: &Colliders,
 ) -> anyhow::Result<()> {
-    writeln!(out, "        {attribute}.timeSamples = {{")?;
-    let mut known = None;
-    snapshots.for_each(|state| {
-        let triangles: Vec<_> = state.intact_triangles().map(|(_, corners)| corners).collect();
-        if known.as_ref() != Some(&triangles) {
-            write!(out, "            {}: ", state.row.step)?;
-            write_list(out, values(&triangles).into_iter())?;
-            known = Some(triangles);
+    let first = snapshots.first()?;
+    let mut moves = vec![false; first.colliders.len()];
+    snapshots.for_each_frame(|frame| {
+        let pairs = first.colliders.iter().zip(&frame.state.colliders);
+        for (moves, (first, now)) in moves.iter_mut().zip(pairs) {
+            *moves |= first.shape != now.shape;
         }
         Ok(())
     })?;
-    writeln!(out, "        }}")?;
+    for (index, solid, pose) in colliders.solids(&first) {
+        writeln!(out, "    def Mesh \"{}\"\n    {{", Colliders::name(index))?;
+        let transform = "matrix4d xformOp:transform";
+        if moves[index] {
+            writeln!(out, "        {transform}.timeSamples = {{")?;
+            snapshots.for_each_frame(|frame| {
+                let shape = frame.state.colliders.get(index).map(|one| &one.shape);
+                let Some(pose) = shape.and_then(|shape| colliders.pose(shape)) else {
+                    return Ok(());
+                };
+                Ok(writeln!(out, "            {}: {},", frame.number, Matrix(pose))?)
+            })?;
+            writeln!(out, "        }}")?;
+        } else {
+            writeln!(out, "        {transform} = {}", Matrix(pose))?;
+        }
+        writeln!(out, "        uniform token[] xformOpOrder = [\"xformOp:transform\"]")?;
+        writeln!(out, "        uniform token subdivisionScheme = \"none\"")?;
+        let vertices = solid.vertices.iter().map(|vertex| Tuple(vertex.as_vec3().to_array()));
+        let counts = solid.faces.iter().map(Vec::len);
+        write_attribute(out, "point3f[] points", vertices)?;
+        write_attribute(out, "int[] faceVertexCounts", counts)?;
+        write_attribute(out, "int[] faceVertexIndices", solid.faces.iter().flatten())?;
+        writeln!(out, "    }}")?;
+    }
     Ok(())
 }
 
-/// Writes a value in brackets, and the comma that ends a sample.
+fn write_attribute<T: Display>(
+    out: &mut dyn Write,
+    attribute: &str,
+    values: impl Iterator<Item = T>,
+) -> std::io::Result<()> {
+    write!(out, "        {attribute} = ")?;
+    write_list(out, values)?;
+    writeln!(out)
+}
+
+/// Writes a value in brackets.
 fn write_list<T: Display>(
     out: &mut dyn Write,
     values: impl Iterator<Item = T>,
@@ -99,15 +304,29 @@ fn write_list<T: Display>(
         let comma = if index == 0 { "" } else { ", " };
         write!(out, "{comma}{value}")?;
     }
-    writeln!(out, "],")
+    write!(out, "]")
 }
 
 /// A vector in the syntax of USD.
-struct Tuple([f32; 3]);
+struct Tuple<const N: usize>([f32; N]);
 
-impl Display for Tuple {
+impl<const N: usize> Display for Tuple<N> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let [x, y, z] = self.0;
-        write!(f, "({x:?}, {y:?}, {z:?})")
+        let numbers = self.0.map(|number| format!("{number:?}"));
+        write!(f, "({})", numbers.join(", "))
+    }
+}
+
+/// A pose as a matrix that multiplies row vectors from the right.
+struct Matrix(Pose);
+
+impl Display for Matrix {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Pose { translation, rotation } = self.0;
+        let [x, y, z] = glam::DVec3::AXES.map(|axis| rotation * axis);
+        let rows = [(x, 0), (y, 0), (z, 0), (translation, 1)];
+        let rows =
+            rows.map(|(row, last)| format!("({:?}, {:?}, {:?}, {last})", row.x, row.y, row.z));
+        write!(f, "({})", rows.join(", "))
     }
 }

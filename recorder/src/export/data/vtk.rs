@@ -1,14 +1,19 @@
-//! VTK: a VTP file (PolyData) per snapshot, and a PVD file that gives their times.
+//! VTK: a VTP file (PolyData) per frame, another one for the colliders, and a PVD file that gives their times.
 
 use std::path::Path;
 
 use recorder::SceneState;
 use sim_contract::ParticleState;
 
+use super::colliders::Colliders;
+use super::faces::Faces;
 use super::polydata::{NumberType, PolyData, PolyDataCounts};
 use super::written_files::WrittenFiles;
 use crate::export::frame_names::FrameNames;
 use crate::export::snapshots::Snapshots;
+
+/// The number of cells without a group or material.
+const NO_NAME: i64 = -1;
 
 /// Writes the files into `folder`.
 pub(crate) fn write(
@@ -16,52 +21,77 @@ pub(crate) fn write(
     folder: &Path,
     files: &mut WrittenFiles,
 ) -> anyhow::Result<()> {
-    let names = FrameNames::new(folder, &snapshots.run.scene_name, "vtp");
+    let scene_name = &snapshots.run.scene_name;
+    let names = FrameNames::new(folder, scene_name, "vtp");
+    let collider_names = FrameNames::new(folder, &format!("{scene_name}_colliders"), "vtp");
+    let colliders = Colliders::of(snapshots)?;
+    let parts: Vec<_> =
+        [Some(&names), colliders.as_ref().map(|_| &collider_names)].into_iter().flatten().collect();
     let collection = names.index_path("pvd");
     files.existing().check(&collection)?;
-    names.prepare(snapshots.steps, files.existing())?;
-    names.remove_older(files.existing())?;
-    snapshots.for_each(|state| {
-        let step = state.row.step;
-        files.add_whole(&names.path(step), &polydata(state, snapshots.run_time_s(step)))
+    for part in &parts {
+        part.prepare(&snapshots.frame_numbers(), files.existing())?;
+        part.remove_older(files.existing())?;
+    }
+    let faces = Faces::of(snapshots)?;
+    snapshots.for_each_frame(|frame| {
+        let (state, time_s) = (frame.state, frame.time_s);
+        files.add_whole(&names.path(frame.number), &polydata(state, &faces, time_s))?;
+        let Some(colliders) = &colliders else { return Ok(()) };
+        let content = collider_polydata(state, colliders, time_s);
+        files.add_whole(&collider_names.path(frame.number), &content)
     })?;
-    files.add_whole(&collection, pvd(snapshots, &names).as_bytes())
+    files.add_whole(&collection, pvd(snapshots, &parts).as_bytes())
 }
 
 /// Returns the collection of all files. Names of files have no character that XML reserves.
-fn pvd(snapshots: &Snapshots<'_>, names: &FrameNames<'_>) -> String {
-    let entries = snapshots.steps.iter().map(|step| {
-        let (time_s, name) = (snapshots.run_time_s(*step), names.name(*step));
-        format!("<DataSet timestep=\"{time_s:?}\" file=\"{name}\"/>\n")
-    });
+fn pvd(snapshots: &Snapshots<'_>, parts: &[&FrameNames<'_>]) -> String {
+    let mut entries = String::new();
+    for number in snapshots.frame_numbers() {
+        let time_s = snapshots.frame_time_s(number);
+        for (part, names) in parts.iter().enumerate() {
+            let name = names.name(number);
+            entries +=
+                &format!("<DataSet timestep=\"{time_s:?}\" part=\"{part}\" file=\"{name}\"/>\n");
+        }
+    }
     format!(
         "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\">\n<Collection>\n\
-         {}</Collection>\n</VTKFile>\n",
-        entries.collect::<String>()
+         {entries}</Collection>\n</VTKFile>\n"
     )
 }
 
 /// Returns the file of a state: a vertex for each particle that nothing connects, a line for each untorn
-/// constraint, and a polygon for each intact triangle.
-fn polydata(state: &SceneState, time_s: f64) -> Vec<u8> {
+/// constraint, and a polygon for each intact face.
+fn polydata(state: &SceneState, faces: &Faces, time_s: f64) -> Vec<u8> {
     let is_connected = state.connected();
     let vertices = (0_u32..).zip(&is_connected).filter(|(_, is_connected)| !**is_connected);
     let vertices: Vec<_> = vertices.map(|(particle, _)| [particle]).collect();
     let lines: Vec<_> = state.untorn_constraints().map(|one| [one.a, one.b]).collect();
-    let triangles: Vec<_> = state.intact_triangles().map(|(_, corners)| corners).collect();
+    let polygons: Vec<_> =
+        faces.intact(state).into_iter().map(|index| &faces.all[index as usize]).collect();
     // Cell data has the order of the cells: vertices, lines, polygons.
     let stretches: Vec<f32> = std::iter::repeat_n(f32::NAN, vertices.len())
         .chain(stretches(state))
-        .chain(std::iter::repeat_n(f32::NAN, triangles.len()))
+        .chain(std::iter::repeat_n(f32::NAN, polygons.len()))
         .collect();
+    let others = vertices.len() + lines.len();
+    let numbers = |of_faces: Vec<Option<u32>>| -> Vec<i64> {
+        let numbers = of_faces.into_iter().map(|one| one.map_or(NO_NAME, i64::from));
+        std::iter::repeat_n(NO_NAME, others).chain(numbers).collect()
+    };
+    let groups = numbers(polygons.iter().map(|face| face.group).collect());
+    let materials = numbers(polygons.iter().map(|face| face.material).collect());
 
     let counts = PolyDataCounts {
         points: state.particles.len(),
         vertices: vertices.len(),
         lines: lines.len(),
-        polygons: triangles.len(),
+        polygons: polygons.len(),
     };
-    let mut file = PolyData::new(counts, time_s);
+    let names: [(&str, &[String]); 2] =
+        [("group_names", &faces.groups), ("material_names", &faces.materials)];
+    let mut file = PolyData::new(counts, time_s, &names);
     file.begin("Points");
     file.add_array("positions", NumberType::Float32, 3, &column(state, |one| one.position));
     file.end("Points");
@@ -72,10 +102,40 @@ fn polydata(state: &SceneState, time_s: f64) -> Vec<u8> {
     file.end("PointData");
     file.begin("CellData");
     file.add_array("stretch", NumberType::Float32, 1, bytemuck::cast_slice(&stretches));
+    if !faces.groups.is_empty() {
+        file.add_array("group", NumberType::Int64, 1, bytemuck::cast_slice(&groups));
+    }
+    if !faces.materials.is_empty() {
+        file.add_array("material", NumberType::Int64, 1, bytemuck::cast_slice(&materials));
+    }
     file.end("CellData");
-    file.add_cells("Verts", &vertices);
-    file.add_cells("Lines", &lines);
-    file.add_cells("Polys", &triangles);
+    file.add_cells("Verts", vertices.iter().map(<[u32; 1]>::as_slice));
+    file.add_cells("Lines", lines.iter().map(<[u32; 2]>::as_slice));
+    file.add_cells("Polys", polygons.iter().map(|face| face.corners.as_slice()));
+    file.finish()
+}
+
+/// Returns the file of the colliders: their faces, each with the index of its collider.
+fn collider_polydata(state: &SceneState, colliders: &Colliders, time_s: f64) -> Vec<u8> {
+    let (mut points, mut cells, mut indices) = (Vec::new(), Vec::<Vec<u32>>::new(), Vec::new());
+    for (index, solid, pose) in colliders.solids(state) {
+        // Meshes have fewer than 2^32 vertices in all, because the text of a scene is limited.
+        let first = u32::try_from(points.len()).unwrap_or(u32::MAX);
+        points.extend(solid.vertices.iter().map(|one| pose.apply(*one).as_vec3().to_array()));
+        indices.extend(std::iter::repeat_n(index as u64, solid.faces.len()));
+        let moved = |face: &Vec<u32>| face.iter().map(|corner| first + corner).collect();
+        cells.extend(solid.faces.iter().map(moved));
+    }
+    let counts =
+        PolyDataCounts { points: points.len(), vertices: 0, lines: 0, polygons: cells.len() };
+    let mut file = PolyData::new(counts, time_s, &[]);
+    file.begin("Points");
+    file.add_array("positions", NumberType::Float32, 3, bytemuck::cast_slice(&points));
+    file.end("Points");
+    file.begin("CellData");
+    file.add_array("collider", NumberType::Int64, 1, bytemuck::cast_slice(&indices));
+    file.end("CellData");
+    file.add_cells("Polys", cells.iter().map(Vec::as_slice));
     file.finish()
 }
 

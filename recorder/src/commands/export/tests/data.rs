@@ -1,10 +1,11 @@
-//! Numbers and meshes: every particle keeps its bits, torn constraints are left out, and nothing is left
-//! after an error.
+//! Numbers and meshes: every particle keeps its bits, every mesh its faces, torn constraints are left out,
+//! frames are evenly spaced, and nothing is left after an error.
 
 use std::io::Cursor;
 use std::path::PathBuf;
 
 use recorder::FrameReader;
+use sim_solver::scene::{Mesh, Shape};
 use zip::ZipArchive;
 
 use super::super::data;
@@ -149,6 +150,235 @@ fn a_scene_without_triangles_is_exported_as_lines_and_loose_vertices() {
     let cells = "NumberOfPoints=\"4\" NumberOfVerts=\"1\" NumberOfLines=\"2\" NumberOfStrips=\"0\" \
                  NumberOfPolys=\"0\"";
     assert!(polydata.contains(cells), "{polydata}");
+}
+
+/// Two quads and a triangle in a row, with seams of texture coordinates, beside a rope that comes first.
+const FACES: &str = "v 0 0 0\nv 0 1 0\nv 1 0 0\nv 1 1 0\nv 2 0 0\nv 2 1 0\nv 3 0 0\nvt 0 0\nvt 0 1\nvt 1 0\nvt 1 1\n\
+    g front side\nusemtl cotton\nf 1/1 3/3 4/4 2/2\nf 3/1 5/3 6/4 4/2\ng 2nd\nusemtl \u{e9}tamine\nf 5/1 7/3 6/2\n";
+
+/// Returns the complete text of a scene with the faces.
+fn faces_scene(tables: &str) -> String {
+    let text = format!(
+        "version = 1\nname = \"faces\"\n{tables}\n[[generate]]\nshape = \"rope\"\ncount = 3\nfrom = [0, 5, 0]\n\
+         to = [1, 5, 0]\n[[generate]]\nshape = \"obj\"\npath = \"a.obj\"\npinned = \"y > 0.5\"\n[[generate]]\n\
+         shape = \"cloth\"\ncolumns = 2\nrows = 2\nspacing = 1\norigin = [0, 9, 0]\n"
+    );
+    Scene::from_toml_with_files(&text, "a", &|_| Ok(FACES.to_owned())).unwrap().to_toml()
+}
+
+/// Returns the texts of the files that an export writes into a folder, by their names.
+fn texts(file: &[u8], format: DataFormat, frames_per_s: Option<u16>) -> BTreeMap<String, String> {
+    let folder = Folder::new(&format!("texts-{format:?}-{frames_per_s:?}"));
+    with_snapshots(file, None, |snapshots| {
+        let snapshots = Snapshots { frames_per_s, ..*snapshots };
+        data::write(&snapshots, format, &folder.0, Existing::Refuse).unwrap();
+    });
+    let text = |name: &String| {
+        String::from_utf8_lossy(&fs::read(folder.0.join(name)).unwrap()).into_owned()
+    };
+    folder.names().into_iter().map(|name| (name.clone(), text(&name))).collect()
+}
+
+fn stage(file: &[u8], frames_per_s: Option<u16>) -> String {
+    let mut bytes = Vec::new();
+    with_snapshots(file, None, |snapshots| {
+        usda::write(&Snapshots { frames_per_s, ..*snapshots }, &mut bytes).unwrap();
+    });
+    String::from_utf8(bytes).unwrap()
+}
+
+#[test]
+fn an_imported_mesh_keeps_its_faces_texture_coordinates_groups_and_materials() {
+    let text = faces_scene("");
+    let file = record(&text, 0);
+    let (_, obj) = texts(&file, DataFormat::Obj, None).into_iter().next().unwrap();
+    // The rope has no faces, and its particles come first.
+    let exported = Mesh::from_obj(&obj).unwrap().mesh;
+    let original = Mesh::from_obj(FACES).unwrap().mesh;
+    assert_eq!(exported.faces[..3], original.faces);
+    assert_eq!(exported.faces.len(), 3 + 2, "and the triangles of the sheet");
+    assert_eq!(exported.vertices[..7], original.vertices);
+    assert_eq!(exported.details.uvs, original.details.uvs);
+    assert_eq!(exported.details.face_uvs[..3], original.details.face_uvs);
+    let scene = Scene::from_toml(&text, "a").unwrap();
+    let Shape::Obj(mesh) = &scene.generators[1].shape else { panic!("not a mesh") };
+    assert_eq!(exported.details.groups[..2], mesh.details.groups);
+    assert_eq!(exported.details.materials[..2], mesh.details.materials);
+    assert!(obj.contains("\nf 4/1 6/3 7/4 5/2\n"), "{obj}");
+    let stage = stage(&file, None);
+    for line in [
+        "int[] faceVertexCounts = [4, 4, 3, 3, 3]",
+        "int[] primvars:st:indices = [0, 2, 3, 1, 0, 2, 3, 1, 0, 2, 1, 4, 4, 4, 4, 4, 4]",
+        "texCoord2f[] primvars:st = [(0.0, 0.0), (0.0, 1.0), (1.0, 0.0), (1.0, 1.0), (0.0, 0.0)]",
+        "def GeomSubset \"group_front_side\"",
+        "def GeomSubset \"group__2nd\"",
+        "rel material:binding = </scene/materials/_tamine>",
+        "int[] indices = [0, 1]",
+        "int[] indices = [2]",
+    ] {
+        assert!(stage.contains(line), "{line}: {stage}");
+    }
+    let vtp = texts(&file, DataFormat::Vtk, None).into_values().nth(1).unwrap();
+    assert!(vtp.contains("NumberOfPolys=\"5\"") && vtp.contains("Name=\"group\""), "{vtp}");
+    let bytes = "50 110 100 0";
+    assert!(vtp.contains(bytes), "the name 2nd: {vtp}");
+}
+
+#[test]
+fn a_face_with_a_torn_side_disappears_and_comes_back_with_a_reset() {
+    let text = faces_scene("");
+    let solver = Solver::new(&Scene::from_toml(&text, "a").unwrap());
+    // The side of the first quad that no other face has: vertices 0 and 1 of the mesh.
+    let side = solver.constraints().position(|one| [one.a, one.b] == [3, 4]).unwrap();
+    let commands = format!(
+        "{{\"step\":2,\"kind\":\"cut\",\"constraint\":{side}}}\n{{\"step\":4,\"kind\":\"reset\"}}\n"
+    );
+    let file = record_commands(&text, &commands, 4);
+    let faces = |obj: &String| obj.lines().filter(|line| line.starts_with("f ")).count();
+    let counts: Vec<_> = texts(&file, DataFormat::Obj, None).values().map(faces).collect();
+    assert_eq!(counts, [5, 5, 4, 4, 5]);
+    let stage = stage(&file, None);
+    let samples = "int[] faceVertexCounts.timeSamples = {\n            0: [4, 4, 3, 3, 3],\n            \
+                   2: [4, 3, 3, 3],\n            4: [4, 4, 3, 3, 3],\n        }";
+    assert!(stage.contains(samples), "{stage}");
+    let subset = "int[] indices.timeSamples = {\n            0: [0, 1],\n            2: [0],\n";
+    assert!(stage.contains(subset), "{stage}");
+    let polygons = texts(&file, DataFormat::Vtk, None);
+    assert!(polygons["faces_00000002.vtp"].contains("NumberOfPolys=\"4\""));
+}
+
+/// A recording whose scene cannot be read, or has another mesh, has the triangles of `/surface`.
+#[test]
+fn without_its_scene_a_mesh_is_exported_as_triangles() {
+    let text = faces_scene("");
+    let other = text.replace("[0, 2, 3, 1]", "[0, 1, 3, 2]");
+    assert_ne!(other, text);
+    for attachment in ["", other.as_str()] {
+        let file = record_with_text(&text, 0, attachment);
+        let (_, obj) = texts(&file, DataFormat::Obj, None).into_iter().next().unwrap();
+        let faces: Vec<_> = obj.lines().filter(|line| line.starts_with("f ")).collect();
+        assert_eq!(faces.len(), 7, "{obj}");
+        assert_eq!(faces[..2], ["f 4 6 7", "f 4 7 5"]);
+    }
+}
+
+#[test]
+fn colliders_are_exported_behind_the_particles_in_their_poses() {
+    let moving = "[[collider]]\nshape = \"sphere\"\ncenter = [0, -3, 0]\nradius = 0.5\nvelocity = [24, 0, 0]\n\
+        [[collider]]\nshape = \"plane\"\nnormal = [0, 1, 0]\noffset = -5\n";
+    let text = faces_scene(moving);
+    let file = record(&text, 10);
+    let count = Solver::new(&Scene::from_toml(&text, "a").unwrap()).particle_count();
+    let objs = texts(&file, DataFormat::Obj, None);
+    let obj = &objs["faces_00000010.obj"];
+    let (cloth, colliders) =
+        obj.split_once("o collider_0\ng collider_0\nusemtl collider\n").unwrap();
+    let (sphere, plane) = colliders.split_once("o collider_1\n").unwrap();
+    let vertices = |text: &str| -> Vec<glam::Vec3> {
+        let lines = text.lines().filter_map(|line| line.strip_prefix("v "));
+        let axes = |line: &str| line.split(' ').map(|one| one.parse().unwrap()).collect::<Vec<_>>();
+        lines.map(|line| glam::Vec3::from_slice(&axes(line))).collect()
+    };
+    assert_eq!(vertices(cloth).len(), count);
+    // It has moved by 0.1 m in each step.
+    let center = glam::Vec3::new(1.0, -3.0, 0.0);
+    let distances = vertices(sphere).into_iter().map(|vertex| vertex.distance(center));
+    assert!(distances.fold(0.0, |most: f32, one| most.max((one - 0.5).abs())) < 1e-4);
+    assert!(vertices(plane).iter().all(|vertex| (vertex.y + 5.0).abs() < 1e-4));
+    let last = count + vertices(sphere).len() + vertices(plane).len();
+    assert!(plane.ends_with(&format!(" {last}\n")), "{plane}");
+
+    let stage = stage(&file, None);
+    let (_, sphere) = stage.split_once("def Mesh \"collider_0\"").unwrap();
+    let (sphere, plane) = sphere.split_once("def Mesh \"collider_1\"").unwrap();
+    let (_, samples) = sphere.split_once("xformOp:transform.timeSamples = {").unwrap();
+    let xs: Vec<f64> = samples
+        .lines()
+        .skip(1)
+        .map_while(|line| line.split_once(": "))
+        .map(|(_, matrix)| {
+            let row = matrix.rsplit('(').next().unwrap();
+            row.split(',').next().unwrap().parse().unwrap()
+        })
+        .collect();
+    assert_eq!(xs.len(), 11);
+    assert!(xs.iter().enumerate().all(|(step, x)| (x - 0.1 * step as f64).abs() < 1e-5), "{xs:?}");
+    assert!(plane.contains("matrix4d xformOp:transform = ("), "{plane}");
+
+    let vtk = texts(&file, DataFormat::Vtk, None);
+    assert_eq!(vtk.len(), 2 * 11 + 1);
+    let pvd = &vtk["faces.pvd"];
+    assert!(pvd.contains("part=\"1\" file=\"faces_colliders_00000010.vtp\""), "{pvd}");
+    assert!(vtk["faces_colliders_00000010.vtp"].contains("Name=\"collider\""));
+    // The mesh of a cache has the vertices of the cache.
+    let folder = Folder::new("cache-colliders");
+    with_snapshots(&file, None, |snapshots| {
+        let target = folder.0.join("a.pc2");
+        data::write(snapshots, DataFormat::Pc2, &target, Existing::Refuse).unwrap();
+    });
+    let mesh = fs::read_to_string(folder.0.join("a.obj")).unwrap();
+    assert_eq!(vertices(&mesh).len(), count);
+}
+
+/// The lines of a mesh that begin with a word, as numbers.
+fn positions(obj: &str) -> Vec<[f32; 3]> {
+    let lines = obj.lines().filter_map(|line| line.strip_prefix("v "));
+    let axes = |line: &str| line.split(' ').map(|one| one.parse().unwrap()).collect::<Vec<f32>>();
+    lines.map(|line| axes(line).try_into().unwrap()).collect()
+}
+
+#[test]
+fn frames_are_evenly_spaced_and_interpolated_between_snapshots() {
+    // 240 Hz: frames of 100 per second lie at steps 0, 2.4, 4.8, 7.2, 9.6 and 12.
+    let file = record(ROPE, 13);
+    let particles = recorded(&file);
+    let at = |step: usize, one: usize| particles[step * 4 + one].position.map(f64::from);
+    let objs = texts(&file, DataFormat::Obj, Some(100));
+    assert_eq!(objs.len(), 6);
+    for (frame, obj) in objs.values().enumerate() {
+        let (step, share) = (12 * frame / 5, (12 * frame % 5) as f64 / 5.0);
+        for (one, found) in positions(obj).into_iter().enumerate() {
+            let [from, to] = [at(step, one), at(step + 1, one)];
+            let expected = [0, 1, 2].map(|axis| from[axis] + (to[axis] - from[axis]) * share);
+            let is_near = |axis: usize| {
+                (f64::from(found[axis]) - expected[axis]).abs()
+                    < 1e-3 * expected[axis].abs().max(1e-3)
+            };
+            assert!((0..3).all(is_near), "frame {frame}: {found:?} {expected:?}");
+        }
+    }
+    assert!(
+        objs["line_00000001.obj"]
+            .starts_with("# frame 1 at 0.010000 s: interpolated between snapshots\n")
+    );
+    assert!(objs["line_00000005.obj"].starts_with("# frame 5 at 0.050000 s: step 12\n"));
+    let exact = positions(&objs["line_00000005.obj"]);
+    let expected: Vec<_> = particles[12 * 4..13 * 4].iter().map(|one| one.position).collect();
+    assert!(exact.into_iter().map(bits).eq(expected.into_iter().map(bits)));
+
+    let stage = stage(&file, Some(100));
+    for line in [
+        "timeCodesPerSecond = 100",
+        "startTimeCode = 0\n    endTimeCode = 5\n",
+        "4 of 6 frames are interpolated between snapshots",
+        "\n            5: [(",
+    ] {
+        assert!(stage.contains(line), "{line}: {stage}");
+    }
+    let vtk = texts(&file, DataFormat::Vtk, Some(100));
+    assert!(vtk["line.pvd"].contains("timestep=\"0.03\" part=\"0\" file=\"line_00000003.vtp\""));
+}
+
+#[test]
+fn frames_before_a_reset_keep_the_snapshot_before_it() {
+    let commands = r#"{"step":7,"kind":"reset"}"#;
+    let file = record_commands(ROPE, commands, 12);
+    let particles = recorded(&file);
+    // Frame 1 lies at step 6.86.
+    let objs = texts(&file, DataFormat::Obj, Some(35));
+    let found = positions(&objs["line_00000001.obj"]);
+    let expected: Vec<_> = particles[6 * 4..7 * 4].iter().map(|one| one.position).collect();
+    assert_eq!(found, expected);
 }
 
 #[test]

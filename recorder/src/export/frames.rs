@@ -1,0 +1,203 @@
+//! Frames of an export: the selected snapshots, or evenly spaced moments between them.
+
+use glam::DQuat;
+use recorder::{ColliderRow, SceneState, ShapeRow};
+use sim_contract::{ParticleState, PlainF32};
+
+use super::snapshots::Snapshots;
+
+/// A moment of an export.
+#[derive(Debug)]
+pub(crate) struct Frame<'a> {
+    /// Number in the names of files, and time code: the step of a snapshot, or with a frame rate the number
+    /// of the frame from 0.
+    pub(crate) number: u64,
+    /// Simulated time of the run, in s.
+    pub(crate) time_s: f64,
+    /// Lies between two snapshots.
+    pub(crate) is_interpolated: bool,
+    pub(crate) state: &'a SceneState,
+}
+
+/// Evenly spaced frames, the first of them at the first selected snapshot.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct FrameGrid {
+    pub(crate) frames_per_s: u16,
+    rate_hz: u32,
+    first_step: u64,
+}
+
+impl FrameGrid {
+    /// Returns the place of a step in frames, multiplied by the rate of the run.
+    fn scaled_place(self, step: u64) -> u128 {
+        u128::from(step.saturating_sub(self.first_step)) * u128::from(self.frames_per_s)
+    }
+
+    fn scaled_frame(self, number: u64) -> u128 {
+        u128::from(number) * u128::from(self.rate_hz)
+    }
+
+    fn time_s(self, number: u64) -> f64 {
+        self.first_step as f64 / f64::from(self.rate_hz)
+            + number as f64 / f64::from(self.frames_per_s)
+    }
+
+    /// Returns the number of frames up to a step.
+    fn count(self, last_step: u64) -> u64 {
+        let last = self.scaled_place(last_step) / u128::from(self.rate_hz);
+        u64::try_from(last).unwrap_or(u64::MAX).saturating_add(1)
+    }
+
+    /// Returns the step at which a frame lies, if it lies at one.
+    fn step(self, number: u64) -> Option<u64> {
+        let (place, frames_per_s) = (self.scaled_frame(number), u128::from(self.frames_per_s));
+        let steps = u64::try_from(place / frames_per_s).ok()?;
+        place.is_multiple_of(frames_per_s).then_some(self.first_step + steps)
+    }
+}
+
+impl Snapshots<'_> {
+    fn grid(&self) -> Option<FrameGrid> {
+        let (rate_hz, first_step) = (self.run.rate_hz, self.steps[0]);
+        self.frames_per_s.map(|frames_per_s| FrameGrid { frames_per_s, rate_hz, first_step })
+    }
+
+    /// Returns the numbers of all frames.
+    pub(crate) fn frame_numbers(&self) -> Vec<u64> {
+        match self.grid() {
+            Some(grid) => (0..grid.count(self.steps[self.steps.len() - 1])).collect(),
+            None => self.steps.to_vec(),
+        }
+    }
+
+    /// Returns the simulated time of the run at a frame, in s.
+    pub(crate) fn frame_time_s(&self, number: u64) -> f64 {
+        self.grid().map_or_else(|| self.run_time_s(number), |grid| grid.time_s(number))
+    }
+
+    /// Returns the numbers of frames in a second.
+    pub(crate) fn time_codes_per_s(&self) -> u32 {
+        self.frames_per_s.map_or(self.run.rate_hz, u32::from)
+    }
+
+    /// Counts the frames that lie between two snapshots.
+    pub(crate) fn interpolated_count(&self) -> usize {
+        let Some(grid) = self.grid() else { return 0 };
+        let is_snapshot = |number: &u64| {
+            grid.step(*number).is_some_and(|step| self.steps.binary_search(&step).is_ok())
+        };
+        self.frame_numbers().iter().filter(|number| !is_snapshot(number)).count()
+    }
+
+    /// Visits all frames from first to last.
+    pub(crate) fn for_each_frame(
+        &self,
+        mut add: impl FnMut(&Frame<'_>) -> anyhow::Result<()>,
+    ) -> anyhow::Result<()> {
+        let Some(grid) = self.grid() else {
+            return self.for_each(|state| {
+                let (number, is_interpolated) = (state.row.step, false);
+                let time_s = self.run_time_s(number);
+                add(&Frame { number, time_s, is_interpolated, state })
+            });
+        };
+        let (mut number, mut before) = (0, None);
+        self.for_each(|state| {
+            while grid.scaled_frame(number) <= grid.scaled_place(state.row.step) {
+                let between =
+                    before.as_ref().and_then(|one| interpolated(grid, number, one, state));
+                let is_interpolated = between.is_some();
+                let frame_state = between.as_ref().unwrap_or(state);
+                let time_s = grid.time_s(number);
+                add(&Frame { number, time_s, is_interpolated, state: frame_state })?;
+                number += 1;
+            }
+            before = Some(state.clone());
+            Ok(())
+        })
+    }
+}
+
+/// Returns the state at a frame between two snapshots, or `None` if it lies at the second one. A state that
+/// a command put in place has no way to it: the frames before it show the first snapshot.
+fn interpolated(
+    grid: FrameGrid,
+    number: u64,
+    before: &SceneState,
+    after: &SceneState,
+) -> Option<SceneState> {
+    let [start, end] = [before, after].map(|state| grid.scaled_place(state.row.step));
+    let frame = grid.scaled_frame(number);
+    if frame == end {
+        return None;
+    }
+    let step_count = after.row.step - before.row.step;
+    let is_continuous = after.row.scene_step.checked_sub(before.row.scene_step) == Some(step_count);
+    let mut state = before.clone();
+    if is_continuous {
+        let share = (frame - start) as f64 / (end - start) as f64;
+        for (particle, target) in state.particles.iter_mut().zip(&after.particles) {
+            move_particle(particle, target, share);
+        }
+        for (collider, target) in state.colliders.iter_mut().zip(&after.colliders) {
+            move_collider(collider, target, share);
+        }
+    }
+    Some(state)
+}
+
+fn move_particle(particle: &mut ParticleState, target: &ParticleState, share: f64) {
+    particle.position = between(particle.position, target.position, share);
+    particle.velocity = between(particle.velocity, target.velocity, share);
+}
+
+fn move_collider(collider: &mut ColliderRow, target: &ColliderRow, share: f64) {
+    use ShapeRow::{Bounds, Box, Capsule, Mesh, Plane, Sphere};
+    let to = |from: &mut [PlainF32; 3], to: [PlainF32; 3]| *from = plain_between(*from, to, share);
+    match (&mut collider.shape, target.shape) {
+        (Plane { normal, offset }, Plane { normal: next_normal, offset: next_offset }) => {
+            to(normal, next_normal);
+            [*offset] = plain_between([*offset], [next_offset], share);
+        }
+        (
+            Box { center, rotation, .. } | Mesh { center, rotation, .. },
+            Box { center: next, rotation: turned, .. }
+            | Mesh { center: next, rotation: turned, .. },
+        ) => {
+            to(center, next);
+            *rotation = turned_between(*rotation, turned, share);
+        }
+        (Sphere { center, .. }, Sphere { center: next, .. }) => to(center, next),
+        (Capsule { a, b, .. }, Capsule { a: next_a, b: next_b, .. }) => {
+            to(a, next_a);
+            to(b, next_b);
+        }
+        (Bounds { min, max }, Bounds { min: next_min, max: next_max }) => {
+            to(min, next_min);
+            to(max, next_max);
+        }
+        _ => {}
+    }
+}
+
+#[allow(clippy::cast_possible_truncation, reason = "a number between two f32 is rounded to one")]
+fn between<const N: usize>(from: [f32; N], to: [f32; N], share: f64) -> [f32; N] {
+    std::array::from_fn(|axis| {
+        let [from, to] = [from[axis], to[axis]].map(f64::from);
+        (from + (to - from) * share) as f32
+    })
+}
+
+fn plain_between<const N: usize>(
+    from: [PlainF32; N],
+    to: [PlainF32; N],
+    share: f64,
+) -> [PlainF32; N] {
+    between(from.map(|one| one.0), to.map(|one| one.0), share).map(PlainF32)
+}
+
+/// Returns the normalised linear interpolation of two rotations, on the shorter way.
+fn turned_between(from: [PlainF32; 4], to: [PlainF32; 4], share: f64) -> [PlainF32; 4] {
+    let [from, to] = [from, to].map(|one| DQuat::from_array(one.map(|part| part.0.into())));
+    from.lerp(to, share).as_quat().to_array().map(PlainF32)
+}
