@@ -90,8 +90,8 @@ pub(crate) struct ExportArgs {
     #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = parse::duration,
         group = "selection", conflicts_with_all = ["from", "to"])]
     at: Vec<Duration>,
-    /// Frames per second, 1 to 100. --apng shows so many of them [default: 25]; --obj, --vtk, --pc2 and
-    /// --usda have so many per second of simulated time, interpolated between the snapshots around them
+    /// Frames per second, 1 to 100: of an animation [default: 25], or of the simulated time in --obj, --vtk,
+    /// --pc2 and --usda, whose frames are interpolated between the snapshots around them
     #[arg(long, value_name = "FPS", allow_hyphen_values = true, value_parser = frames_per_s)]
     fps: Option<u16>,
     /// Width and height of pictures in pixels, 16 to 8192 each [default: 960x720]

@@ -21,7 +21,7 @@ pub struct Mesh {
     pub faces: Vec<Vec<u32>>,
     /// Vertices of each group and object, ascending.
     pub groups: BTreeMap<String, Vec<u32>>,
-    /// What exports write with the faces.
+    /// Texture coordinates and names of the faces, which exports write.
     pub details: FaceDetails,
 }
 

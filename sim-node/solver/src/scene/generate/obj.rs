@@ -29,7 +29,7 @@ pub struct Obj {
     /// Bending rigidity, if it has any.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub bending: Option<MeshBending>,
-    /// What exports write with the faces.
+    /// Texture coordinates and names of the faces, which exports write.
     #[serde(flatten)]
     pub details: FaceDetails,
 }

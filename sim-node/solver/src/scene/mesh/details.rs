@@ -1,4 +1,4 @@
-//! What a mesh says of its faces beside their corners. The simulation ignores it; exports write it.
+//! Texture coordinates and names of the faces of a mesh. The simulation ignores them; exports write them.
 
 use serde::Serialize;
 
