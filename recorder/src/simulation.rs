@@ -62,12 +62,12 @@ pub fn simulate<W: Write, E: From<WriteError>>(
     let States { mut solver, mut given } = states;
     let Start { step: first_step, .. } = job.start;
     let run = job.description(&solver);
-    let begin = |log: &mut &mut LogWriter<W>| {
+    let begin = |log: &mut LogWriter<W>| {
         let mut writer = StateWriter::new(log, &run, &job.scene, job.start, &solver)?;
         writer.write_state(log, &solver, first_step)?;
         Ok::<_, WriteError>(writer)
     };
-    let mut writer = log.as_mut().map(begin).transpose()?;
+    let mut writer = log.as_deref_mut().map(begin).transpose()?;
     let mut result = SimulationResult::at_start(job.start, &solver);
     let mut pending = job.commands.as_slice();
     let mut kept = KeptStates::for_commands(pending);

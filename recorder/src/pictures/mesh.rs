@@ -127,7 +127,9 @@ impl MeshDrawing<'_> {
             let corners = self.state.triangles[*triangle].corners;
             let [a, b, c] = corners.map(|corner| self.point(corner));
             let normal = (b - a).cross(c - a);
-            corners.iter().for_each(|corner| normals[*corner as usize] += normal);
+            for corner in corners {
+                normals[corner as usize] += normal;
+            }
         }
         normals
     }
@@ -189,7 +191,7 @@ impl MeshDrawing<'_> {
                 Style::Wires(_) => is_marked || particles.len() < DOTS_BELOW,
                 Style::Shaded => false,
             };
-            if !(is_shown || !is_connected[place]) {
+            if !is_shown && is_connected[place] {
                 continue;
             }
             let after = last_at[place].unwrap_or(usize::MAX);

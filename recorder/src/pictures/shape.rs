@@ -143,6 +143,7 @@ impl Color {
         clippy::cast_sign_loss,
         reason = "a fraction of a byte, rounded, is a byte"
     )]
+    #[must_use]
     pub fn times(self, share: f64) -> Self {
         Self(self.0.map(|part| (f64::from(part) * share).round() as u8))
     }
