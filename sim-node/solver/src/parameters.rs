@@ -93,6 +93,14 @@ impl Target {
         }
     }
 
+    /// The one collider that a setting is for.
+    fn collider(self) -> Option<u32> {
+        match self {
+            Self::Collider(collider) => Some(collider),
+            _ => None,
+        }
+    }
+
     /// Checks that a setting of this parameter can be for this target.
     fn check(self, parameter: Parameter, context: Context<'_>) -> Result<(), Reason> {
         let info = parameter.info();
@@ -317,8 +325,12 @@ impl Parameters {
                     self.block_bending.clear();
                 }
             },
-            Parameter::Friction => self.surfaces.set(target, |one| one.friction = or_zero),
-            Parameter::Restitution => self.surfaces.set(target, |one| one.restitution = or_zero),
+            Parameter::Friction => {
+                self.surfaces.set(target.collider(), |one| one.friction = or_zero);
+            }
+            Parameter::Restitution => {
+                self.surfaces.set(target.collider(), |one| one.restitution = or_zero);
+            }
             // The pace belongs to the node. It is checked here, so that every program refuses the
             // same values.
             Parameter::TimeScale => {}

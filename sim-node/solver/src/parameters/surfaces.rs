@@ -3,7 +3,6 @@
 use serde::{Deserialize, Serialize};
 use sim_types::Parameter;
 
-use super::Target;
 use crate::checks::Context;
 use crate::scene::definition::collider::SceneCollider;
 
@@ -45,11 +44,11 @@ impl Surfaces {
         self.0.iter().any(|one| one.restitution > 0.0)
     }
 
-    /// Changes the surface of the collider that a setting is for, or of all.
-    pub(crate) fn set(&mut self, target: Target, change: impl Fn(&mut ColliderSurface)) {
-        match target {
-            Target::Collider(collider) => change(&mut self.0[collider as usize]),
-            _ => self.0.iter_mut().for_each(change),
+    /// Changes the surface of one collider, or of all.
+    pub(crate) fn set(&mut self, collider: Option<u32>, change: impl Fn(&mut ColliderSurface)) {
+        match collider {
+            Some(collider) => change(&mut self.0[collider as usize]),
+            None => self.0.iter_mut().for_each(change),
         }
     }
 
