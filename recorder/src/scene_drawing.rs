@@ -2,10 +2,9 @@
 
 mod solids;
 
-use std::collections::BTreeSet;
-
 use prost::Message as _;
 use sim_contract::{ColliderState, ParticleState, TornConstraint};
+use sim_solver::TornSides;
 use sim_solver::scene::ColliderMeshes;
 
 use crate::log::WORLD_FRAME;
@@ -27,8 +26,6 @@ const SURFACE_COLOR: Color = Color { r: 0.72, g: 0.2, b: 0.18, a: 0.85 };
 pub struct DrawnMesh {
     /// Particles of each constraint.
     pub ends: Vec<[u32; 2]>,
-    /// By constraint: it is structural.
-    pub is_structural: Vec<bool>,
     /// Particles of each triangle.
     pub triangles: Vec<[u32; 3]>,
     /// Triangles of the colliders that are meshes.
@@ -42,8 +39,8 @@ pub struct DrawnMesh {
 pub struct SceneDrawing {
     mesh: DrawnMesh,
     is_torn: Vec<bool>,
-    /// A triangle is gone once any structural constraint along one of its edges is torn.
-    is_gone: Vec<bool>,
+    /// The sides of the triangles. A triangle with a torn side is not drawn.
+    sides: TornSides,
     colliders: Vec<ColliderState>,
     /// The last encoded message had the meshes where they are.
     are_meshes_known: bool,
@@ -55,7 +52,10 @@ impl SceneDrawing {
     pub fn new(mesh: DrawnMesh) -> Self {
         Self {
             is_torn: vec![false; mesh.ends.len()],
-            is_gone: vec![false; mesh.triangles.len()],
+            sides: TornSides::of_triangles(
+                mesh.ends.iter().copied(),
+                mesh.triangles.iter().copied(),
+            ),
             colliders: Vec::new(),
             are_meshes_known: false,
             plane_extent: PlaneExtent::around(mesh.bounds),
@@ -72,19 +72,13 @@ impl SceneDrawing {
     /// Replaces the list of torn constraints.
     pub fn set_torn(&mut self, torn: &[TornConstraint]) {
         self.is_torn.fill(false);
-        let mut edges = BTreeSet::new();
-        for constraint in torn.iter().map(|torn| torn.constraint as usize) {
-            if let Some(ends) = self.mesh.ends.get(constraint) {
-                self.is_torn[constraint] = true;
-                if self.mesh.is_structural.get(constraint) == Some(&true) {
-                    edges.insert(ordered(*ends));
-                }
+        for one in torn {
+            if let Some(is_torn) = self.is_torn.get_mut(one.constraint as usize) {
+                *is_torn = true;
             }
         }
-        for (is_gone, [a, b, c]) in self.is_gone.iter_mut().zip(&self.mesh.triangles) {
-            *is_gone =
-                [[*a, *b], [*b, *c], [*c, *a]].map(ordered).iter().any(|edge| edges.contains(edge));
-        }
+        let torn = (0_u32..).zip(&self.is_torn).filter(|(_, is_torn)| **is_torn);
+        self.sides.set_torn(torn.map(|(constraint, _)| constraint));
     }
 
     /// Draws a state as a message on `/scene`. The entities have the same ids each time, so each replaces
@@ -117,8 +111,10 @@ impl SceneDrawing {
             let particle = particles.get(*particle as usize);
             particle.is_some_and(|one| one.position.iter().all(|axis| axis.is_finite()))
         };
-        let sticks = remaining(&self.mesh.ends, &self.is_torn, has_place);
-        let triangles = remaining(&self.mesh.triangles, &self.is_gone, has_place);
+        let is_left = |constraint: u32| !self.is_torn[constraint as usize];
+        let sticks = remaining(&self.mesh.ends, is_left, has_place);
+        let is_whole = |triangle| self.sides.is_whole(triangle);
+        let triangles = remaining(&self.mesh.triangles, is_whole, has_place);
         let points = points(particles);
         let surface = TriangleListPrimitive {
             pose: Some(IDENTITY),
@@ -147,19 +143,16 @@ impl SceneDrawing {
     }
 }
 
-fn ordered([a, b]: [u32; 2]) -> [u32; 2] {
-    [a.min(b), a.max(b)]
-}
-
 /// Returns the particles of the elements that are left and whose particles all have a finite position.
 fn remaining<const N: usize>(
     elements: &[[u32; N]],
-    is_gone: &[bool],
+    is_left: impl Fn(u32) -> bool,
     has_place: impl Fn(&u32) -> bool,
 ) -> Vec<u32> {
-    let elements = elements.iter().zip(is_gone);
-    let left = elements.filter(|(element, is_gone)| !**is_gone && element.iter().all(&has_place));
-    left.flat_map(|(element, _)| *element).collect()
+    let elements = (0_u32..).zip(elements);
+    let left =
+        elements.filter(|(index, element)| is_left(*index) && element.iter().all(&has_place));
+    left.flat_map(|(_, element)| *element).collect()
 }
 
 /// Converts the positions. A position that is not finite keeps its index but is not drawn.
@@ -194,7 +187,6 @@ mod tests {
     fn drawing() -> SceneDrawing {
         SceneDrawing::new(DrawnMesh {
             ends: vec![[0, 1], [1, 2], [2, 3], [2, 1], [0, 1]],
-            is_structural: vec![true, false, true, false, false],
             triangles: vec![[0, 1, 2], [3, 2, 1]],
             ..DrawnMesh::default()
         })
@@ -217,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn torn_constraints_and_the_triangles_along_structural_ones_are_not_drawn() {
+    fn torn_constraints_and_triangles_with_a_torn_side_are_not_drawn() {
         let mut drawing = drawing();
         let torn = |list: &[u32]| {
             list.iter().map(|one| TornConstraint::new(*one, None)).collect::<Vec<_>>()
@@ -225,9 +217,12 @@ mod tests {
         drawing.set_torn(&torn(&[2, 99]));
         let sticks = &[0, 1, 1, 2, 2, 1, 0, 1][..];
         assert_eq!(indices(&drawing.draw(0, &particles())), (sticks, &[0, 1, 2][..]));
-        drawing.set_torn(&torn(&[1, 3, 4]));
+        // The other constraints between the same particles still hold these sides.
+        drawing.set_torn(&torn(&[3, 4, 4]));
         let all = &[0, 1, 2, 3, 2, 1][..];
-        assert_eq!(indices(&drawing.draw(0, &particles())), (&[0, 1, 2, 3][..], all));
+        assert_eq!(indices(&drawing.draw(0, &particles())), (&[0, 1, 1, 2, 2, 3][..], all));
+        drawing.set_torn(&torn(&[1, 3]));
+        assert_eq!(indices(&drawing.draw(0, &particles())).1.len(), 0, "the common side");
         drawing.set_torn(&[]);
         assert_eq!(indices(&drawing.draw(0, &particles())).1.len(), 6);
     }

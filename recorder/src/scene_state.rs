@@ -1,13 +1,12 @@
 //! The state of a scene at a snapshot, with everything that pictures and meshes show.
 
-use std::collections::BTreeSet;
 use std::io::Read;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use sim_contract::{ColliderState, ConstraintKind, ConstraintState, ParticleState, Torn, Triangle};
+use sim_contract::{ColliderState, ConstraintState, ParticleState, Torn, Triangle};
 use sim_solver::scene::{ColliderMesh, ColliderMeshes};
-use sim_solver::{Scene, Solver};
+use sim_solver::{Scene, Solver, TornSides};
 
 use crate::log::{
     ColliderRow, CollidersRow, ForcesRow, Frame, FrameReader, LogReader, Message, OutcomeRow,
@@ -15,8 +14,6 @@ use crate::log::{
 };
 use crate::recorded_scene::recorded_scene;
 use crate::simulation::{colliders_row, forces_row, step_row};
-
-const STRUCTURAL_KIND: u32 = ConstraintKind::Structural as u32;
 
 /// The reason why the state of a recording cannot be shown.
 #[derive(Debug, thiserror::Error)]
@@ -66,6 +63,8 @@ pub struct SceneState {
     pub is_torn: Vec<bool>,
     /// The triangles as loaded.
     pub triangles: Vec<Triangle>,
+    /// The sides of the triangles. None if nothing has torn yet.
+    pub sides: Option<TornSides>,
     /// In their poses after the step.
     pub colliders: Vec<ColliderRow>,
     /// The triangles of the colliders, once one of them is a mesh.
@@ -95,7 +94,7 @@ pub fn visit_states<R: Read, E: From<SceneStateError>>(
         state.apply_frame(frame, &mut tears)?;
         state.read_meshes(frames.log());
         if steps.next_if_eq(&state.row.step).is_some() {
-            state.set_torn(tears.at(state.row.step))?;
+            state.set_torn(tears.at(state.row.step).iter().flat_map(|torn| torn.indices()))?;
             state.check_indices()?;
             if visit(&state)?.is_break() {
                 break;
@@ -123,13 +122,12 @@ impl SceneState {
         let mut state = Self {
             row: found.row,
             particles: found.particles.to_vec(),
-            is_torn: vec![false; constraints.len()],
             constraints,
             triangles: tape.surface().triangles().ok_or(SceneStateError::Surface)?,
             colliders: found.colliders.map_or_else(Vec::new, |row| row.colliders),
             ..Self::default()
         };
-        state.set_torn(Some(&found.torn))?;
+        state.set_torn(found.torn.indices())?;
         if state.has_meshes() {
             state.collider_meshes = scene.map(|scene| Arc::new(scene.collider_meshes()));
         }
@@ -140,21 +138,18 @@ impl SceneState {
     /// Returns the state of a solver after a step.
     pub fn of_solver(solver: &Solver, scene: &Scene, step: u64) -> Self {
         let constraints: Vec<_> = solver.constraints().map(constraint_state).collect();
-        let mut is_torn = vec![false; constraints.len()];
-        for constraint in solver.torn() {
-            is_torn[*constraint as usize] = true;
-        }
         let triangles = solver.triangles().iter();
         let mut state = Self {
             row: step_row(solver, step),
             particles: bytemuck::cast_slice(solver.particles()).to_vec(),
             constraints,
-            is_torn,
             triangles: triangles.map(|corners| Triangle { corners: *corners }).collect(),
             colliders: colliders_row(solver, step).colliders,
             forces: forces_row(solver, step),
             ..Self::default()
         };
+        // A solver tears only constraints that it has.
+        let _is_torn = state.set_torn(solver.torn().iter().copied());
         if state.has_meshes() {
             state.collider_meshes = Some(Arc::new(scene.collider_meshes()));
         }
@@ -183,10 +178,11 @@ impl SceneState {
         match message {
             Message::Topology(row) => {
                 self.constraints = row.constraints().ok_or(SceneStateError::Topology)?;
-                self.is_torn = vec![false; self.constraints.len()];
+                self.sides = None;
             }
             Message::Surface(row) => {
                 self.triangles = row.triangles().ok_or(SceneStateError::Surface)?;
+                self.sides = None;
             }
             Message::Colliders(row) => self.colliders.clone_from(&row.colliders),
             Message::Outcome(row) => self.outcomes.push(row.clone()),
@@ -213,13 +209,32 @@ impl SceneState {
         self.collider_meshes.as_ref()?.get(&collider)
     }
 
-    fn set_torn(&mut self, torn: Option<&Torn>) -> Result<(), SceneStateError> {
-        self.is_torn.fill(false);
-        for constraint in torn.iter().flat_map(|torn| torn.indices()) {
+    /// Replaces the torn constraints.
+    ///
+    /// # Errors
+    /// The first that is not in the topology.
+    pub fn set_torn(&mut self, torn: impl Iterator<Item = u32>) -> Result<(), SceneStateError> {
+        self.is_torn.clear();
+        self.is_torn.resize(self.constraints.len(), false);
+        for constraint in torn {
             let is_torn = self.is_torn.get_mut(constraint as usize);
             *is_torn.ok_or(SceneStateError::Torn { constraint })? = true;
         }
+        let Self { constraints, triangles, is_torn, sides, .. } = self;
+        if sides.is_none() && is_torn.contains(&true) {
+            let ends = constraints.iter().map(|one| [one.a, one.b]);
+            let corners = triangles.iter().map(|one| one.corners);
+            *sides = Some(TornSides::of_triangles(ends, corners));
+        }
+        if let Some(sides) = sides {
+            sides.set_torn(indices(is_torn));
+        }
         Ok(())
+    }
+
+    /// Returns the indices of the torn constraints, ascending.
+    pub fn torn_constraints(&self) -> impl Iterator<Item = u32> {
+        indices(&self.is_torn)
     }
 
     /// Returns the colliders as a node publishes them.
@@ -234,18 +249,13 @@ impl SceneState {
         constraints.filter(|(_, is_torn)| !**is_torn).map(|(constraint, _)| constraint)
     }
 
-    /// Returns the index and the corners of each triangle without a torn structural edge.
+    /// Returns the index and the corners of each triangle without a torn side.
     pub fn intact_triangles(&self) -> impl Iterator<Item = (usize, [u32; 3])> {
-        let torn_edges: BTreeSet<_> = (self.constraints.iter().zip(&self.is_torn))
-            .filter(|(constraint, is_torn)| **is_torn && constraint.kind == STRUCTURAL_KIND)
-            .map(|(constraint, _)| edge(constraint.a, constraint.b))
-            .collect();
-        let is_intact = move |[a, b, c]: [u32; 3]| {
-            let edges = [edge(a, b), edge(b, c), edge(c, a)];
-            torn_edges.is_empty() || !edges.iter().any(|edge| torn_edges.contains(edge))
-        };
-        let triangles = self.triangles.iter().map(|triangle| triangle.corners).enumerate();
-        triangles.filter(move |(_, corners)| is_intact(*corners))
+        let is_whole = |triangle| self.sides.as_ref().is_none_or(|sides| sides.is_whole(triangle));
+        let triangles = (0_u32..).zip(&self.triangles);
+        triangles
+            .filter(move |(triangle, _)| is_whole(*triangle))
+            .map(|(triangle, one)| (triangle as usize, one.corners))
     }
 
     /// Returns for each particle whether an untorn constraint or an intact triangle uses it.
@@ -276,7 +286,7 @@ impl SceneState {
     }
 }
 
-/// Returns the edge with its ends in ascending order.
-fn edge(a: u32, b: u32) -> (u32, u32) {
-    (a.min(b), a.max(b))
+/// Returns the indices at which the value is true.
+fn indices(is_torn: &[bool]) -> impl Iterator<Item = u32> {
+    (0_u32..).zip(is_torn).filter(|(_, is_torn)| **is_torn).map(|(index, _)| index)
 }

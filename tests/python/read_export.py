@@ -17,7 +17,6 @@ import numpy as np
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
-STRUCTURAL = 0
 
 
 class Recording:
@@ -38,7 +37,6 @@ class Recording:
         self.flags = np.ascontiguousarray(self.particles[:, :, 7]).view("<u4")
         topology = self.rows["/topology"][0]
         self.ends = np.stack([topology["a"], topology["b"]], axis=1)
-        self.kinds = np.array(topology["kind"])
         self.rest_lengths = np.array(topology["rest_length"], "f4")
         self.triangles = np.array(self.rows["/surface"][0]["triangles"], int).reshape(-1, 3)
         self.rate_hz = 240
@@ -59,9 +57,15 @@ class Recording:
         return [i for i in range(len(self.ends)) if i not in self.torn(step)]
 
     def intact(self, step, polygons):
-        torn = [i for i in self.torn(step) if self.kinds[i] == STRUCTURAL]
-        edges = {frozenset(self.ends[i].tolist()) for i in torn}
-        return [one for one in polygons if not any(edge <= set(one) for edge in edges)]
+        """The polygons without a torn side of a triangle: one whose constraints are all torn."""
+        torn = {frozenset(self.ends[i].tolist()) for i in self.torn(step)}
+        edges = torn - {frozenset(self.ends[i].tolist()) for i in self.untorn(step)}
+
+        def is_torn(one):
+            fan = [{one[0], *one[i : i + 2]} for i in range(1, len(one) - 1)]
+            return any(edge <= corners for edge in edges for corners in fan)
+
+        return [one for one in polygons if not is_torn(one)]
 
     def intact_triangles(self, step):
         return self.intact(step, self.triangles.tolist())

@@ -107,8 +107,7 @@ impl MeshDrawing<'_> {
         shapes.into_iter().map(|(_, shape)| shape).collect()
     }
 
-    /// Returns the triangles without a torn structural edge, from back to front. Ties are sorted by
-    /// index.
+    /// Returns the triangles without a torn side, from back to front. Ties are sorted by index.
     fn triangles(&self) -> Vec<usize> {
         let mut order: Vec<_> = (self.state.intact_triangles())
             .map(|(index, corners)| {

@@ -12,6 +12,7 @@ pub(crate) mod parameters;
 pub(crate) mod projection;
 pub(crate) mod projection_block;
 pub(crate) mod separation;
+pub(crate) mod sides;
 pub(crate) mod tether_pull;
 pub(crate) mod tethers;
 

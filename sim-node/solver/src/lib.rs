@@ -44,6 +44,7 @@ pub use commands::preparation::{Plan, Prepared, Spare};
 pub use commands::{Grab, Push};
 pub use constraints::Constraint;
 pub use constraints::bends::{Bend, BendShape, RestShape};
+pub use constraints::sides::TornSides;
 pub use contacts::bodies::driven_body::BodyMotion;
 pub use contacts::colliders::PlacedCollider;
 pub use frame::Pose;

@@ -36,6 +36,7 @@ use crate::constraints::fields::Pass;
 use crate::constraints::order::ProjectionOrders;
 use crate::constraints::parameters::ConstraintParameters;
 use crate::constraints::projection::TearMark;
+use crate::constraints::sides::TornSides;
 use crate::contacts::contact::ContactRoom;
 use crate::kernels::Kernels;
 use crate::kernels::lanes::PackedParticle;
@@ -65,6 +66,10 @@ pub(crate) struct ParticleStore {
     /// By constraint: where its parameters are.
     locations: Vec<Location>,
     bends: StoredBends,
+    /// The sides of the triangles; empty in scenes without wind.
+    triangles: TornSides,
+    /// True if triangles have torn, or are whole again, since the wind last blew.
+    are_triangles_changed: bool,
     contact_room: ContactRoom,
 }
 
@@ -132,6 +137,8 @@ impl ParticleStore {
             is_torn: vec![false; model.constraints.len()],
             locations,
             bends,
+            triangles: TornSides::default(),
+            are_triangles_changed: false,
             contact_room: ContactRoom::default(),
         };
         store.locate_constraints(model);
@@ -198,15 +205,25 @@ impl ParticleStore {
         }
     }
 
-    /// Takes a constraint, and the bends with it in their path, out of every pass.
+    /// Takes a constraint out of every pass, and with its side the bends and triangles.
     pub(crate) fn tear(&mut self, constraint: u32) {
         let was_torn = std::mem::replace(&mut self.is_torn[constraint as usize], true);
         self.set_parameters(constraint, &ConstraintParameters::INACTIVE);
         if !was_torn {
-            for place in 0..self.bends.paths.of(constraint).len() {
-                let bend = self.bends.paths.of(constraint)[place];
-                self.bends.count_torn(bend, true);
-                self.set_bend(bend, f32::INFINITY);
+            self.follow_side(constraint, |_| f32::INFINITY);
+        }
+    }
+
+    /// Follows a constraint that has torn, or is no longer torn: the triangles at its side, and the bends with
+    /// the side in their path, which get a new scaled compliance.
+    fn follow_side(&mut self, constraint: u32, compliance: impl Fn(u32) -> f32) {
+        let is_torn = self.is_torn[constraint as usize];
+        self.are_triangles_changed |= self.triangles.follow(constraint, is_torn);
+        if self.bends.sides.follow(constraint, is_torn) {
+            for place in 0..self.bends.sides.owners(constraint).len() {
+                let bend = self.bends.sides.owners(constraint)[place];
+                let is_whole = self.bends.sides.is_whole(bend);
+                self.set_bend(bend, if is_whole { compliance(bend) } else { f32::INFINITY });
             }
         }
     }
@@ -371,8 +388,14 @@ impl ParticleStore {
     /// Computes the velocities that the wind adds in the running substep.
     pub(crate) fn blow(&mut self, wind: &WindStep) {
         let kernels = self.kernels();
-        self.graph.blow(kernels, wind);
-        for patch in &mut self.patches {
+        let are_changed = std::mem::take(&mut self.are_triangles_changed);
+        let Self { graph, patches, triangles, .. } = self;
+        if are_changed {
+            graph.follow_triangles(triangles);
+            patches.iter_mut().for_each(|patch| patch.follow_triangles(triangles));
+        }
+        graph.blow(kernels, wind);
+        for patch in patches {
             patch.blow(kernels, wind);
         }
     }

@@ -13,7 +13,6 @@ use recorder::{
     SceneDrawing, StatusRow, StepRow, SurfaceRow, TearsRow, Topic, TopicFormat, TopologyRow, Up,
     encode_transform, scene_format,
 };
-use sim_contract::ConstraintKind;
 use sim_contract::clock::{SECOND_NS, monotonic_ns, realtime_ns};
 
 use crate::sink::{State, Topology, Torn};
@@ -33,7 +32,6 @@ const TOPICS: [Topic; 9] = [
     Topic::Particles,
 ];
 /// Number of the kind in [`Scene::kinds`].
-const STRUCTURAL_KIND: u8 = ConstraintKind::Structural as u8;
 /// Time between two messages on `/scene`. Each is twice as large as the particles and encoded anew.
 const SCENE_PERIOD_NS: u64 = SECOND_NS / 10;
 /// Time after which `/scene` has everything again. A slow client may have missed the message with the meshes.
@@ -411,7 +409,6 @@ fn drawing(scene: &Scene) -> SceneDrawing {
     let bounds = scene.bounds();
     SceneDrawing::new(DrawnMesh {
         ends: scene.ends.clone(),
-        is_structural: scene.kinds.iter().map(|kind| *kind == STRUCTURAL_KIND).collect(),
         triangles: scene.triangles.clone(),
         collider_meshes: scene.collider_meshes.clone(),
         bounds: [bounds.min, bounds.max],

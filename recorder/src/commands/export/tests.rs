@@ -259,15 +259,21 @@ fn counts(picture: &Picture) -> [usize; 3] {
 }
 
 #[test]
-fn torn_constraints_and_triangles_with_a_torn_structural_edge_are_left_out() {
+fn torn_constraints_and_triangles_with_a_torn_side_are_left_out() {
     let mut state = square();
-    assert_eq!(counts(&draw(&state)), [2, 5, 4]);
-    state.is_torn[4] = true;
-    assert_eq!(counts(&draw(&state)), [2, 4, 4], "shear makes no hole");
-    state.is_torn[2] = true;
-    assert_eq!(counts(&draw(&state)), [1, 3, 4]);
-    state.is_torn[0] = true;
-    assert_eq!(counts(&draw(&state)), [0, 2, 4]);
+    // A second constraint along the edge from 1 to 3.
+    state.constraints.push(ConstraintState { a: 3, b: 1, ..state.constraints[0] });
+    for (torn, expected) in [
+        (&[][..], [2, 6, 4]),
+        (&[2], [2, 5, 4]),
+        (&[2, 5], [1, 4, 4]),
+        (&[2, 5, 0], [0, 3, 4]),
+        (&[4], [0, 5, 4]),
+        (&[5], [2, 5, 4]),
+    ] {
+        state.set_torn(torn.iter().copied()).unwrap();
+        assert_eq!(counts(&draw(&state)), expected, "{torn:?}");
+    }
 }
 
 /// The square stands at an angle to the light, and a rope and a loose particle beside it.

@@ -6,12 +6,10 @@ use recorder::{
     AllCounts, DrawnMesh, GapCounter, LogReader, SCENE_TOPIC, SceneDrawing, SceneState,
     scene_format,
 };
-use sim_contract::{ConstraintKind, TornConstraint};
+use sim_contract::TornConstraint;
 
 use super::recording_copy::RecordingCopy;
 use crate::export::snapshots::Snapshots;
-
-const STRUCTURAL_KIND: u32 = ConstraintKind::Structural as u32;
 
 /// Copies the whole recording, with a drawing after each selected snapshot.
 pub(crate) fn write(snapshots: &Snapshots<'_>, out: &mut dyn Write) -> anyhow::Result<()> {
@@ -50,7 +48,6 @@ fn mesh(state: &SceneState) -> DrawnMesh {
     let constraints = &state.constraints;
     DrawnMesh {
         ends: constraints.iter().map(|one| [one.a, one.b]).collect(),
-        is_structural: constraints.iter().map(|one| one.kind == STRUCTURAL_KIND).collect(),
         triangles: state.triangles.iter().map(|one| one.corners).collect(),
         collider_meshes: state.collider_meshes.as_deref().cloned().unwrap_or_default(),
         bounds: bounds(state),
@@ -66,6 +63,5 @@ fn bounds(state: &SceneState) -> [[f32; 3]; 2] {
 }
 
 fn torn(state: &SceneState) -> Vec<TornConstraint> {
-    let constraints = (0_u32..).zip(&state.is_torn).filter(|(_, is_torn)| **is_torn);
-    constraints.map(|(index, _)| TornConstraint::new(index, None)).collect()
+    state.torn_constraints().map(|index| TornConstraint::new(index, None)).collect()
 }

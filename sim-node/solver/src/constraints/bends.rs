@@ -3,7 +3,6 @@
 pub(crate) mod block;
 pub(crate) mod families;
 pub(crate) mod hinge;
-pub(crate) mod paths;
 pub(crate) mod projection;
 
 use glam::Vec3;
@@ -124,14 +123,16 @@ impl Bend {
         Self { particles, coefficients: TWIST, geometry, rigidity, shape, block: None }
     }
 
-    /// Pairs of particles, as positions in [`Self::particles`], whose constraints form the path of a
-    /// bend: neighbours on a line, the sides of a cell, or those of two triangles.
-    pub(crate) fn path(&self) -> &'static [[usize; 2]] {
-        match self.shape {
+    /// The sides that form the path of a bend: neighbours on a line, the sides of a cell, or the sides of two
+    /// triangles.
+    pub(crate) fn path(&self) -> impl Iterator<Item = [u32; 2]> + use<> {
+        let sides: &[[usize; 2]] = match self.shape {
             BendShape::Line => &[[0, 1], [1, 2]],
             BendShape::Cell => &[[0, 1], [0, 2], [1, 3], [2, 3]],
             BendShape::Hinge { .. } => &[[0, 1], [0, 2], [1, 2], [1, 3], [2, 3]],
-        }
+        };
+        let particles = self.particles;
+        sides.iter().map(move |ends| ends.map(|end| particles[end]))
     }
 
     /// Compliance over h^2 in 1/kg. Infinite for a bend without effect.

@@ -79,6 +79,9 @@ pub(crate) struct Sheet {
     pub(crate) first: u32,
     pub(crate) columns: u32,
     pub(crate) rows: u32,
+    /// Index of the first triangle. Each cell has two, row by row: upper left, lower left, lower right; and upper
+    /// left, lower right, upper right.
+    pub(crate) first_triangle: u32,
 }
 
 impl Sheet {

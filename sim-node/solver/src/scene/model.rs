@@ -129,6 +129,11 @@ impl Model {
         [a, b]
     }
 
+    /// Returns the particles of each constraint.
+    pub(crate) fn pairs(&self) -> impl Iterator<Item = [u32; 2]> + '_ {
+        self.constraints.iter().map(|one| [one.a, one.b])
+    }
+
     /// Returns the distance between two particles in f32, as a step measures it.
     pub(crate) fn distance(&self, a: u32, b: u32) -> f32 {
         self.distance_squared(a, b).sqrt()

@@ -9,6 +9,7 @@ use crate::constraints::builder::ConstraintBuilder;
 use crate::constraints::families::Family;
 use crate::constraints::fields::ConstraintFields;
 use crate::constraints::parameters::ConstraintParameters;
+use crate::constraints::sides::TornSides;
 use crate::parameters::{Affected, Parameters};
 use crate::scene::model::Model;
 
@@ -62,8 +63,8 @@ impl ParticleStore {
     }
 
     fn derive_bend(&mut self, bend: u32, builder: &ConstraintBuilder<'_>) {
-        let is_active = self.bends.is_active(bend);
-        self.set_bend(bend, if is_active { builder.bend_compliance(bend) } else { f32::INFINITY });
+        let is_whole = self.bends.sides.is_whole(bend);
+        self.set_bend(bend, if is_whole { builder.bend_compliance(bend) } else { f32::INFINITY });
     }
 
     fn parameters_of(
@@ -101,18 +102,14 @@ impl ParticleStore {
         self.use_fields(builder.model, self.survey.fields(builder.pass_count()), scene)
     }
 
-    /// Deactivates the constraints that have torn since the last call, with their bends, and activates
-    /// those that are no longer torn.
+    /// Deactivates the constraints that have torn since the last call, with the bends and triangles at their sides,
+    /// and activates those that are no longer torn.
     fn follow_tears(&mut self, builder: &ConstraintBuilder<'_>, is_torn: &[bool]) {
         for (constraint, is_torn) in (0_u32..).zip(is_torn) {
             if self.is_torn[constraint as usize] != *is_torn {
                 self.is_torn[constraint as usize] = *is_torn;
                 self.set_parameters(constraint, &self.parameters_of(constraint, builder));
-                for place in 0..self.bends.paths.of(constraint).len() {
-                    let bend = self.bends.paths.of(constraint)[place];
-                    self.bends.count_torn(bend, *is_torn);
-                    self.derive_bend(bend, builder);
-                }
+                self.follow_side(constraint, |bend| builder.bend_compliance(bend));
             }
         }
     }
@@ -136,6 +133,7 @@ impl ParticleStore {
         if self.is_allocated && self.layout.fits(&before) {
             return Configured::InPlace;
         }
+        self.allocate_triangles(model);
         self.graph.allocate(model);
         for patch in &mut self.patches {
             patch.allocate();
@@ -150,6 +148,17 @@ impl ParticleStore {
         self.workers.reserve_contacts(self.contact_room);
         self.is_allocated = true;
         Configured::Moved
+    }
+
+    /// Finds the sides of the triangles on which wind may blow, the torn ones included.
+    fn allocate_triangles(&mut self, model: &Model) {
+        self.are_triangles_changed = self.layout.scene.wind;
+        if self.layout.scene.wind {
+            let triangles = model.triangles.iter().copied();
+            self.triangles = TornSides::of_triangles(model.pairs(), triangles);
+            let torn = (0_u32..).zip(&self.is_torn).filter(|(_, is_torn)| **is_torn);
+            self.triangles.set_torn(torn.map(|(constraint, _)| constraint));
+        }
     }
 
     /// Updates the locations of the constraints and bends of sheets and crowds, whose indices depend on the

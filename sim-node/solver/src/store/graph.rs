@@ -16,7 +16,7 @@ use forces::{GraphForces, MovedParticles};
 use group::ConstraintGroup;
 pub(crate) use group::part_count;
 pub(crate) use indices::find_particle;
-use wind::{GraphWindWork, TriangleGroup, triangle_groups};
+use wind::{GraphSurface, GraphWindWork};
 
 use super::layout::{Layout, Location, SceneFields};
 use super::publish::{PublishedMotion, publish};
@@ -27,6 +27,7 @@ use crate::constraints::columns::{ConstraintColumns, FullPass};
 use crate::constraints::fields::Pass;
 use crate::constraints::order::ProjectionOrder;
 use crate::constraints::parameters::{ConstraintParameters, PassSoftness};
+use crate::constraints::sides::TornSides;
 use crate::kernels::Kernels;
 use crate::kernels::huge_pages::refill;
 use crate::kernels::lanes::{Lanes8, PackedParticle};
@@ -53,7 +54,7 @@ pub(crate) struct Graph {
     /// in scenes without wind.
     gains: Vec<[Lanes8; 3]>,
     /// Empty in scenes without wind.
-    triangles: Vec<TriangleGroup>,
+    surface: GraphSurface,
     /// By particle: its tethers; empty in scenes without tethers.
     tethers: Vec<PackedTether>,
     groups: Vec<ConstraintGroup>,
@@ -172,7 +173,8 @@ impl Graph {
         let group_count = self.particles.len() / 8;
         self.predicted = vec![[[0.0; 8]; 3]; if bounces { group_count } else { 0 }];
         self.gains = vec![[[0.0; 8]; 3]; if wind { group_count } else { 0 }];
-        self.triangles = if wind { triangle_groups(model, &self.indices) } else { Vec::new() };
+        self.surface =
+            if wind { GraphSurface::new(model, &self.indices) } else { GraphSurface::default() };
         let none = PackedTether { root: [0.0; 3], length: f32::INFINITY };
         self.tethers = vec![none; tethers * self.indices.len()];
         self.bends.allocate(bend_multipliers);
@@ -367,10 +369,15 @@ impl Graph {
         self.particles[index].0[4..7].copy_from_slice(&displacement);
     }
 
+    /// Takes the triangles with torn sides out of the wind.
+    pub(crate) fn follow_triangles(&mut self, triangles: &TornSides) {
+        self.surface.share_masses(|triangle| triangles.is_whole(triangle));
+    }
+
     /// Computes the velocities that the wind adds in the running substep.
     pub(crate) fn blow(&mut self, kernels: Kernels, wind: &WindStep) {
-        let Self { particles, triangles, gains, .. } = self;
-        kernels.run(GraphWindWork { particles, triangles, gains, wind });
+        let Self { particles, surface, gains, .. } = self;
+        kernels.run(GraphWindWork { particles, triangles: &surface.groups, gains, wind });
     }
 
     pub(crate) fn tether_mut(&mut self, index: usize, slot: usize) -> &mut PackedTether {

@@ -20,7 +20,7 @@ use bands::Bands;
 use bend_layout::BendLayout;
 use shared_sweep::SharedSweep;
 use sheet_layout::SheetLayout;
-use wind::SheetWindWork;
+use wind::{SheetWindWork, TornCells};
 
 use super::layout::Layout;
 use super::rows::{RowLayout, Rows};
@@ -31,6 +31,7 @@ use crate::constraints::column_writer::{ColumnOrder, ColumnWriter};
 use crate::constraints::families::{Family, Sheet};
 use crate::constraints::fields::Pass;
 use crate::constraints::parameters::ConstraintParameters;
+use crate::constraints::sides::TornSides;
 use crate::kernels::Kernels;
 use crate::kernels::lent_slice::LentSlice;
 use crate::state::particles::Particle;
@@ -53,6 +54,7 @@ pub(crate) struct Patch {
     layout: SheetLayout,
     column_order: ColumnOrder,
     schedule: Schedule,
+    torn_cells: TornCells,
     /// By row: bit n is set if its projection n has pulls. Empty while nobody asks for forces.
     pull_masks: Vec<u32>,
 }
@@ -67,6 +69,7 @@ impl Patch {
             layout,
             column_order: ColumnOrder::default(),
             schedule: Schedule::default(),
+            torn_cells: TornCells::default(),
             pull_masks: Vec::new(),
         }
     }
@@ -89,6 +92,9 @@ impl Patch {
     pub(crate) fn allocate(&mut self) {
         self.rows.allocate();
         let RowLayout { rows, length, stride, fields, .. } = self.rows.layout;
+        if fields.scene.wind {
+            self.torn_cells = TornCells::new(&self.rows.layout);
+        }
         self.column_order = ColumnOrder::new(fields.constraints);
         let constraints_at = self.rows.layout.constraints_at * stride;
         for row in 0..rows {
@@ -199,9 +205,15 @@ impl Patch {
         self.rows.pack(&mut states[particles], h, workers)
     }
 
+    /// Takes the triangles with torn sides out of the wind.
+    pub(crate) fn follow_triangles(&mut self, triangles: &TornSides) {
+        let first = self.sheet.first_triangle;
+        self.torn_cells.follow(&self.rows.layout, triangles, first);
+    }
+
     /// Computes the velocities that the wind adds in the running substep.
     pub(crate) fn blow(&mut self, kernels: Kernels, wind: &WindStep) {
         let (layout, numbers, _) = self.rows.split_mut();
-        kernels.run(SheetWindWork { numbers, layout, wind });
+        kernels.run(SheetWindWork { numbers, layout, wind, torn: &self.torn_cells });
     }
 }

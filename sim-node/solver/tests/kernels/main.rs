@@ -99,7 +99,7 @@ fn sheet(columns: u32, rows: u32, solver: &str, generator: &str) -> String {
 const LINKS: &str = "links = [\"structural\", \"shear\", \"bend\"]\npinned = \"corners\"";
 
 /// Settings and generator keys that affect constraints.
-const VARIANTS: [(&str, &str, &str); 13] = [
+const VARIANTS: [(&str, &str, &str); 14] = [
     ("rigid", "substeps = 3", LINKS),
     ("passes", "substeps = 2\niterations = 3\nrelaxation = 1.2", LINKS),
     ("tethers", "substeps = 2\ntethers = true", LINKS),
@@ -128,6 +128,11 @@ const VARIANTS: [(&str, &str, &str); 13] = [
         "substeps = 2\ntethers = 1\n[wind]\nvelocity = [3, 9, 2]\ndrag = 0.6\ngust = 0.4\ngust_period = 0.1",
         LINKS,
     ),
+    (
+        "torn in wind",
+        "substeps = 2\ntear_stretch = 1.05\n[wind]\nvelocity = [3, 9, 2]\ndrag = 0.6",
+        LINKS,
+    ),
     ("torn bends", "substeps = 2\ntear_stretch = 1.05\ntear_force = 40", "bending = [40, 5]"),
 ];
 
@@ -147,6 +152,7 @@ fn kernels_agree_on_sheets_of_every_size_around_a_vector() {
         let by_itself = [TearCause::Force, TearCause::Stretch, TearCause::Distance].map(tears);
         match name {
             "torn" | "torn bends" => assert_eq!(by_itself, [true, true, false]),
+            "torn in wind" => assert_eq!(by_itself, [false, true, false]),
             "one diagonal" => assert_eq!(by_itself, [false, false, true]),
             _ => assert_eq!(by_itself, [false; 3], "{name}"),
         }

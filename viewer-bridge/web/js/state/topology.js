@@ -68,16 +68,15 @@ export class Topology {
     for (let corner = 0; corner < this.fanEntries.length; corner++) this.writeRestLength(corner);
   }
 
-  /** Removes constraints, and splits the triangles along structural ones. @param {ArrayLike<number>} constraints */
+  /** Removes constraints, and splits the triangles with a torn side. @param {ArrayLike<number>} constraints */
   remove(constraints) {
     for (let k = 0; k < constraints.length; k++) {
       const i = constraints[k];
       if (i >= this.isGone.length || this.isGone[i]) continue;
       this.isGone[i] = 1;
       this.styles[i] |= STICK.isGone;
-      const isStructural = this.scene.constraintKinds[i] === CONSTRAINT.structural;
       for (const corner of this.edgeCorners.at(i)) {
-        if (isStructural) {
+        if (this.isTornSide(corner)) {
           this.kill(triangleOf(corner));
           this.split.add(triangleOf(corner));
         } else this.writeRestLength(corner);
@@ -114,18 +113,17 @@ export class Topology {
    * triangle beside it does. @param {number} corner @param {(particle: number) => Uint32Array} cornersAt */
   isTornEdge(corner, cornersAt) {
     const { triangles } = this.scene;
-    if (this.edgeConstraints.at(corner).length > 0) return this.isTornConstraint(corner);
+    if (this.edgeConstraints.at(corner).length > 0) return this.isTornSide(corner);
     const [a, b] = [triangles[corner], triangles[nextCorner(corner)]];
     const beside = [corner, ...[a, b].flatMap((one) => [...cornersAt(one)].filter((other) => other !== corner && isBetween(triangles, other, a, b)))];
-    return beside.every((one) => [nextCorner(one), nextCorner(nextCorner(one))].some((other) => this.isTornConstraint(other)));
+    return beside.every((one) => [nextCorner(one), nextCorner(nextCorner(one))].some((other) => this.isTornSide(other)));
   }
 
-  /** True if a structural constraint along an edge is gone, or all others where there is none. @param {number} corner */
-  isTornConstraint(corner) {
-    const { constraintKinds } = this.scene;
+  /** True if constraints join the ends of the edge from a corner to the next, and all of them are gone: the solver's rule
+   * (TornSides in sim-node/solver/src/constraints/sides.rs), by which such a triangle catches no wind and touches nothing. @param {number} corner */
+  isTornSide(corner) {
     const members = this.edgeConstraints.at(corner);
-    const structural = members.filter((one) => constraintKinds[one] === CONSTRAINT.structural);
-    return structural.length > 0 ? structural.some((one) => this.isGone[one] === 1) : members.length > 0 && members.every((one) => this.isGone[one] === 1);
+    return members.length > 0 && members.every((one) => this.isGone[one] === 1);
   }
 
   /** Rest length of an edge, or its length in the scene without a constraint. @param {number} corner */

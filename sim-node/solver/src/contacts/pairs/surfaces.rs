@@ -137,7 +137,7 @@ impl SurfaceContacts {
         // Cuts since the last step are in no hash yet.
         if self.torn != now || !torn.new_tears().is_empty() {
             self.torn = now;
-            self.surface.follow_tears(torn.all());
+            self.surface.follow_tears(torn.order());
         }
     }
 

@@ -70,9 +70,12 @@ impl ConstraintBuilder<'_> {
         self.model.push(Constraint { a, b, rest_length, compliance, kind }, family);
     }
 
-    /// Declares the shape a sheet. All of its links must be family links.
+    /// Declares the shape a sheet. All of its links must be family links, and each of its cells must have two
+    /// triangles, in the order of [`Sheet::first_triangle`].
+    #[allow(clippy::cast_possible_truncation, reason = "at most 2^24 triangles")]
     pub(super) fn sheet(&mut self, columns: u32, rows: u32) {
-        self.model.sheets.push(Sheet { first: self.first, columns, rows });
+        let first_triangle = self.model.triangles.len() as u32;
+        self.model.sheets.push(Sheet { first: self.first, columns, rows, first_triangle });
     }
 
     /// Appends a bend.

@@ -6,41 +6,71 @@ use crate::kernels::vectors::{lane_of, set_lane, store, sum};
 use crate::scene::model::Model;
 use crate::step::wind::{Corner, WindStep};
 
+/// The triangles between particles of the graph, in the order of the scene.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct GraphSurface {
+    pub(crate) groups: Vec<TriangleGroup>,
+    /// By triangle of the graph: its index in the scene.
+    triangles: Vec<u32>,
+    /// By particle: number of its triangles that have no torn side.
+    counts: Vec<f32>,
+}
+
 /// Eight triangles. The corners of padding are the particle behind the last one, which nothing moves.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TriangleGroup {
     /// By corner: the particles.
     particles: [[u32; 8]; 3],
-    /// By corner: the fractions of the particles' masses that belong to the triangles.
+    /// By corner: the fractions of the particles' masses that belong to the triangles; 0 for triangles with a torn
+    /// side, which gain nothing from the wind.
     shares_max: [Lanes8; 3],
 }
 
-/// The triangles between particles of the graph, in the order of the scene. `indices` are those of the
-/// particles in the scene.
-pub(crate) fn triangle_groups(model: &Model, indices: &[u32]) -> Vec<TriangleGroup> {
-    let find = |particle: u32| find_particle(indices, particle);
-    let triangles: Vec<[u32; 3]> = model
-        .triangles
-        .iter()
-        .filter_map(|[a, b, c]| Some([find(*a)?, find(*b)?, find(*c)?]))
-        .collect();
-    let mut counts = vec![0.0; indices.len()];
-    for corner in triangles.iter().flatten() {
-        counts[*corner as usize] += 1.0;
+impl GraphSurface {
+    /// `indices` are those of the particles in the scene.
+    pub(crate) fn new(model: &Model, indices: &[u32]) -> Self {
+        let find = |particle: u32| find_particle(indices, particle);
+        #[allow(clippy::cast_possible_truncation, reason = "at most 2^24 particles")]
+        let padding = indices.len() as u32;
+        let mut surface = Self { counts: vec![0.0; indices.len()], ..Self::default() };
+        for (triangle, corners) in (0_u32..).zip(&model.triangles) {
+            let [Some(a), Some(b), Some(c)] = corners.map(find) else { continue };
+            let lane = surface.triangles.len() % 8;
+            if lane == 0 {
+                let particles = [[padding; 8]; 3];
+                surface.groups.push(TriangleGroup { particles, shares_max: [[0.0; 8]; 3] });
+            }
+            let group = surface.triangles.len() / 8;
+            for (corner, particle) in [a, b, c].into_iter().enumerate() {
+                surface.groups[group].particles[corner][lane] = particle;
+            }
+            surface.triangles.push(triangle);
+        }
+        surface.share_masses(|_| true);
+        surface
     }
-    #[allow(clippy::cast_possible_truncation, reason = "at most 2^24 particles")]
-    let padding = indices.len() as u32;
-    let group = |triangles: &[[u32; 3]]| {
-        let mut group = TriangleGroup { particles: [[padding; 8]; 3], shares_max: [[0.0; 8]; 3] };
-        for (lane, triangle) in triangles.iter().enumerate() {
-            for (corner, particle) in triangle.iter().enumerate() {
-                group.particles[corner][lane] = *particle;
-                group.shares_max[corner][lane] = 1.0 / counts[*particle as usize];
+
+    /// Divides the masses of particles among their triangles without torn sides.
+    pub(crate) fn share_masses(&mut self, is_whole: impl Fn(u32) -> bool) {
+        let Self { groups, triangles, counts } = self;
+        counts.fill(0.0);
+        for (group, triangles) in groups.iter().zip(triangles.chunks(8)) {
+            for (lane, _) in triangles.iter().enumerate().filter(|(_, one)| is_whole(**one)) {
+                for particles in &group.particles {
+                    counts[particles[lane] as usize] += 1.0;
+                }
             }
         }
-        group
-    };
-    triangles.chunks(8).map(group).collect()
+        for (group, triangles) in groups.iter_mut().zip(triangles.chunks(8)) {
+            for (lane, triangle) in triangles.iter().enumerate() {
+                let is_whole = is_whole(*triangle);
+                for (particles, shares_max) in group.particles.iter().zip(&mut group.shares_max) {
+                    let count = counts[particles[lane] as usize];
+                    shares_max[lane] = if is_whole { 1.0 / count } else { 0.0 };
+                }
+            }
+        }
+    }
 }
 
 /// Computes the velocities that the wind adds to the particles of the graph.

@@ -2,8 +2,11 @@
 //!
 //! Each cell has two triangles: upper left, lower left, lower right; and upper left, lower right, upper
 //! right. The wind on eight cells is computed at once. Then eight particles sum it, each over its six
-//! triangles in their order in the scene. At the border, triangles that are not there add 0.
+//! triangles in their order in the scene. At the border, triangles that are not there add 0, and so do those with a
+//! torn side.
 
+use crate::constraints::sides::TornSides;
+use crate::kernels::huge_pages::refill;
 use crate::kernels::lanes::{LaneWork, Lanes8, Wide, axes, lane_groups, lane_groups_mut};
 use crate::kernels::vectors::sum;
 use crate::step::wind::{Corner, TriangleWind, WindStep};
@@ -17,6 +20,74 @@ pub(crate) struct SheetWindWork<'a> {
     pub(crate) numbers: &'a mut [f32],
     pub(crate) layout: &'a RowLayout,
     pub(crate) wind: &'a WindStep,
+    pub(crate) torn: &'a TornCells,
+}
+
+/// The torn triangles of a sheet.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct TornCells {
+    /// By cell: 1 if its triangle at the lower left is torn, else 0. A row has [`MARGIN`] numbers in front of its
+    /// first cell. The first row belongs to the cells above the first particles, and the last one to those below the last.
+    lower: Vec<f32>,
+    /// The same for the triangles at the upper right.
+    upper: Vec<f32>,
+    row_length: usize,
+    are_any: bool,
+}
+
+/// Numbers in front of a row of torn cells, for the cells left of the first column.
+const MARGIN: usize = 8;
+
+impl TornCells {
+    /// Makes room for the cells of a sheet, none of which is torn.
+    pub(crate) fn new(layout: &RowLayout) -> Self {
+        let row_length = MARGIN + layout.columns.next_multiple_of(8);
+        let mut torn = Self { row_length, ..Self::default() };
+        for triangles in [&mut torn.lower, &mut torn.upper] {
+            refill(triangles, row_length * (layout.rows + 1), 0.0);
+        }
+        torn
+    }
+
+    /// Marks the triangles with torn sides. `first` is the first triangle of the sheet.
+    pub(crate) fn follow(&mut self, layout: &RowLayout, triangles: &TornSides, first: u32) {
+        let Self { lower, upper, row_length, are_any } = self;
+        *are_any = false;
+        let mut triangle = first;
+        for row in 1..layout.rows {
+            for column in 1..layout.columns {
+                let place = row * *row_length + MARGIN + column - 1;
+                for torn in [&mut lower[place], &mut upper[place]] {
+                    let is_torn = !triangles.is_whole(triangle);
+                    *torn = if is_torn { 1.0 } else { 0.0 };
+                    *are_any |= is_torn;
+                    triangle += 1;
+                }
+            }
+        }
+    }
+
+    /// Number of the torn triangles around eight particles.
+    #[inline(always)]
+    fn count<W: Wide>(&self, row: usize, column: usize) -> W {
+        let load = |torn: &[f32], at| W::load(&lane_groups(torn, at, 1)[0], 0);
+        let (left, right) = (MARGIN + column - 1, MARGIN + column);
+        let [lower_above, upper_above] = self.above(row);
+        let [lower_below, upper_below] = self.above(row + 1);
+        load(lower_above, left)
+            + load(upper_above, left)
+            + load(lower_above, right)
+            + load(upper_below, left)
+            + load(lower_below, right)
+            + load(upper_below, right)
+    }
+
+    /// The lower and the upper triangles of the cells above a row of particles.
+    #[inline(always)]
+    fn above(&self, row: usize) -> [&[f32]; 2] {
+        let numbers = row * self.row_length..(row + 1) * self.row_length;
+        [&self.lower[numbers.clone()], &self.upper[numbers]]
+    }
 }
 
 /// Consecutive columns of a sheet.
@@ -49,6 +120,14 @@ impl LaneWork for SheetWindWork<'_> {
 
     #[inline(always)]
     fn run<W: Wide>(mut self) {
+        if self.torn.are_any { self.blow::<W, true>() } else { self.blow::<W, false>() }
+    }
+}
+
+impl SheetWindWork<'_> {
+    /// It is compiled with torn triangles and without, which therefore cost nothing.
+    #[inline(always)]
+    fn blow<W: Wide, const ARE_TORN: bool>(&mut self) {
         let RowLayout { columns, rows, .. } = *self.layout;
         for first in (0..columns).step_by(8 * STRIP_GROUPS) {
             let groups = (columns - first).div_ceil(8).min(STRIP_GROUPS);
@@ -58,20 +137,23 @@ impl LaneWork for SheetWindWork<'_> {
                 let (above, below) =
                     if row % 2 == 0 { (&odd, &mut even) } else { (&even, &mut odd) };
                 if row + 1 < rows {
-                    self.blow_at_cells::<W>(row, strip, below);
+                    self.blow_at_cells::<W, ARE_TORN>(row, strip, below);
                 } else {
                     *below = CellRow::CALM;
                 }
-                self.add_up::<W>(row, strip, [above, below]);
+                self.add_up::<W, ARE_TORN>(row, strip, [above, below]);
             }
         }
     }
-}
 
-impl SheetWindWork<'_> {
     /// Computes the wind on the cells between a row and the next one.
     #[inline(always)]
-    fn blow_at_cells<W: Wide>(&self, row: usize, strip: Strip, cells: &mut CellRow) {
+    fn blow_at_cells<W: Wide, const ARE_TORN: bool>(
+        &self,
+        row: usize,
+        strip: Strip,
+        cells: &mut CellRow,
+    ) {
         // The first strip has no cells left of it.
         let skipped = usize::from(strip.first == 0);
         let from = strip.first + 8 * skipped - 8;
@@ -82,14 +164,27 @@ impl SheetWindWork<'_> {
             let [a, b] = [above_left.load::<W>(group), below_left.load(group)];
             let [c, d] = [below_right.load(group), above_right.load(group)];
             let is_cell = column::<W>(from + 8 * group).is_below(self.last_column());
-            store(self.wind.on_triangle([a, b, c]), is_cell, (&mut cells.lower, skipped + group));
-            store(self.wind.on_triangle([a, c, d]), is_cell, (&mut cells.upper, skipped + group));
+            let [lower, upper] = if ARE_TORN {
+                self.torn.above(row + 1).map(|torn| {
+                    let torn = W::load(&lane_groups(torn, MARGIN + from + 8 * group, 1)[0], 0);
+                    W::both(is_cell, torn.is_below(W::splat(1.0)))
+                })
+            } else {
+                [is_cell; 2]
+            };
+            store(self.wind.on_triangle([a, b, c]), lower, (&mut cells.lower, skipped + group));
+            store(self.wind.on_triangle([a, c, d]), upper, (&mut cells.upper, skipped + group));
         }
     }
 
     /// Adds up the velocities that the particles of a row gain from the cells above and below.
     #[inline(always)]
-    fn add_up<W: Wide>(&mut self, row: usize, strip: Strip, [above, below]: [&CellRow; 2]) {
+    fn add_up<W: Wide, const ARE_TORN: bool>(
+        &mut self,
+        row: usize,
+        strip: Strip,
+        [above, below]: [&CellRow; 2],
+    ) {
         let RowLayout { rows, length, stride, .. } = *self.layout;
         let last_column = self.last_column::<W>();
         let one_if = |is_there| W::splat(if is_there { 1.0 } else { 0.0 });
@@ -108,7 +203,10 @@ impl SheetWindWork<'_> {
             let column = column::<W>(strip.first + 8 * group);
             let left = one.masked(zero.is_below(column));
             let right = one.masked(column.is_below(last_column));
-            let count = is_above * (two * left + right) + is_below * (left + two * right);
+            let mut count = is_above * (two * left + right) + is_below * (left + two * right);
+            if ARE_TORN {
+                count = count - self.torn.count::<W>(row, strip.first + 8 * group);
+            }
             let share_max = one / count;
             // The cell left of a particle, and the one that begins at it.
             let (left, right) = (8 * group + 7, 8 * group + 8);

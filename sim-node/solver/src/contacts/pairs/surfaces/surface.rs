@@ -4,6 +4,7 @@ use glam::Vec3;
 
 use super::super::load::LoadPairs;
 use super::nearest::{Feature, Nearest, SIDE_TOLERANCE, is_on_side_of, next};
+use crate::constraints::sides::TornSides;
 use crate::kernels::lanes::PackedParticle;
 use crate::scene::model::Model;
 
@@ -25,10 +26,8 @@ pub(super) struct Surface {
     fan_starts: Vec<u32>,
     /// The triangles around each slot, ascending.
     fans: Vec<u32>,
-    /// By triangle and edge: the constraint between its ends.
-    sides: Vec<[Option<u32>; 3]>,
-    /// By triangle: true if a side is torn. Such a triangle touches nothing.
-    is_torn: Vec<bool>,
+    /// The sides of the triangles. A triangle with a torn side touches nothing.
+    sides: TornSides,
 }
 
 /// Another triangle at an edge.
@@ -70,11 +69,10 @@ pub(super) struct Found {
 impl Surface {
     /// `triangles` have slots as corners. They are in the order of the tiles.
     pub(super) fn new(model: &Model, particles: &[u32], triangles: Vec<[u32; 3]>) -> Self {
-        let sides = sides(model, particles, &triangles);
+        let corners = triangles.iter().map(|corners| corners.map(|slot| particles[slot as usize]));
         let mut surface = Self {
             across: across(&triangles),
-            sides,
-            is_torn: vec![false; triangles.len()],
+            sides: TornSides::of_triangles(model.pairs(), corners),
             corners: triangles,
             ..Self::default()
         };
@@ -116,16 +114,13 @@ impl Surface {
     }
 
     /// Takes the triangles with torn sides out.
-    pub(super) fn follow_tears(&mut self, is_torn: &[bool]) {
-        for (is_triangle_torn, sides) in self.is_torn.iter_mut().zip(&self.sides) {
-            *is_triangle_torn =
-                sides.iter().flatten().any(|constraint| is_torn[*constraint as usize]);
-        }
+    pub(super) fn follow_tears(&mut self, torn: &[u32]) {
+        self.sides.set_torn(torn.iter().copied());
         self.set_opposites();
     }
 
     pub(super) fn is_whole(&self, triangle: u32) -> bool {
-        !self.is_torn[triangle as usize]
+        self.sides.is_whole(triangle)
     }
 
     pub(super) fn has_corner(&self, triangle: u32, slot: u32) -> bool {
@@ -301,22 +296,6 @@ fn across(triangles: &[[u32; 3]]) -> Vec<[Option<Neighbor>; 3]> {
     across
 }
 
-/// By triangle and edge: the first constraint between its ends.
-fn sides(model: &Model, particles: &[u32], triangles: &[[u32; 3]]) -> Vec<[Option<u32>; 3]> {
-    let ascending = |[a, b]: [u32; 2]| [a.min(b), a.max(b)];
-    let pairs = (0_u32..).zip(&model.constraints);
-    let mut pairs: Vec<_> = pairs.map(|(at, one)| (ascending([one.a, one.b]), at)).collect();
-    pairs.sort_unstable();
-    let mut sides = vec![[None; 3]; triangles.len()];
-    for TriangleEdge { ends, triangle, edge } in edges(triangles) {
-        let ends = ascending(ends.map(|slot| particles[slot as usize]));
-        let first = pairs.partition_point(|(pair, _)| *pair < ends);
-        let found = pairs.get(first).filter(|(pair, _)| *pair == ends);
-        sides[triangle as usize][edge] = found.map(|(_, constraint)| *constraint);
-    }
-    sides
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::samples::{sheet, surface_of};
@@ -326,9 +305,7 @@ mod tests {
         let model = sheet(4, 0.5);
         let (mut surface, _) = surface_of(&model);
         let whole = surface.opposites.clone();
-        let mut is_torn = vec![false; model.constraints.len()];
-        is_torn[10] = true;
-        surface.follow_tears(&is_torn);
+        surface.follow_tears(&[10]);
         let torn: Vec<_> = (0..18).filter(|triangle| !surface.is_whole(*triangle)).collect();
         assert!(!torn.is_empty());
         for (triangle, opposites) in (0_u32..).zip(&surface.opposites) {
@@ -339,7 +316,7 @@ mod tests {
             assert_eq!(*opposites, expected);
         }
         assert_ne!(surface.opposites, whole);
-        surface.follow_tears(&vec![false; model.constraints.len()]);
+        surface.follow_tears(&[]);
         assert_eq!(surface.opposites, whole);
     }
 }
