@@ -225,7 +225,8 @@ impl Solver {
     ///
     /// # Errors
     /// The parameter is unknown, the value has another form or is out of range, or the softness
-    /// belongs to the other method.
+    /// belongs to the other method. A contact distance is out of range if at load each particle has more than 32
+    /// neighbours, on average, within 1.6 times of it, or 128 triangles.
     pub fn set(
         &mut self,
         name: &str,
@@ -260,9 +261,19 @@ impl Solver {
     fn set_for(&mut self, name: &str, value: ParameterValue, target: Target) -> Result<(), Reason> {
         // Taken out meanwhile, because the context borrows the rest.
         let mut parameters = std::mem::take(&mut self.parameters);
+        let thickness = parameters.contact_thickness;
         let affected = parameters.set(name, value, target, self.context());
         self.parameters = parameters;
         let affected = affected?;
+        if self.parameters.contact_thickness != thickness {
+            // At once, because only the lists of neighbours tell whether they fit.
+            self.derive_particle_contacts();
+            if self.particle_contacts.are_overfull() {
+                self.parameters.contact_thickness = thickness;
+                self.derive_particle_contacts();
+                return Err(Reason::OutOfRange);
+            }
+        }
         self.follow_surfaces();
         self.due.constraints |= affected > Affected::Nothing;
         self.due.tethers |= affected == Affected::RigidPaths;

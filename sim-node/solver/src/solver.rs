@@ -276,7 +276,7 @@ impl Solver {
     }
 
     /// Derives the contacts of particles with each other, if their distance has changed.
-    fn derive_particle_contacts(&mut self) {
+    pub(crate) fn derive_particle_contacts(&mut self) {
         let thickness = self.parameters.contact_thickness;
         if !self.particle_contacts.are_derived_from(thickness) {
             if !self.accept_particle_contacts() {

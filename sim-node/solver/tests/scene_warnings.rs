@@ -395,6 +395,71 @@ fn contacts_of_shapes_that_all_refuse_them_cause_a_warning() {
 }
 
 #[test]
+fn a_thickness_with_more_neighbours_than_the_solver_remembers_causes_a_warning() {
+    let expected = "contact.thickness: at load, each particle has more than 32 other particles or 128 triangles, on \
+                    average, within";
+    let contact = |mode: &str, thickness: f32| {
+        let sheet = SHEET.replace("columns = 5\nrows = 5", "columns = 24\nrows = 24");
+        let contact = format!("[contact]\nmode = \"{mode}\"\nthickness = {thickness}\n");
+        warnings(&format!("gravity = [0, 0, 0]\n{contact}{sheet}"))
+    };
+    for mode in ["particles", "surfaces"] {
+        let is_overfull =
+            |thickness| contact(mode, thickness).iter().any(|one| one.starts_with(expected));
+        assert_eq!([0.1, 0.2, 0.4].map(is_overfull), [false, false, true], "{mode}");
+    }
+}
+
+#[test]
+fn gravity_that_does_not_point_down_causes_a_warning() {
+    assert_warns(
+        &format!("up = \"z\"\n{PAIR}"),
+        "up is \"z\", but gravity = [0.0, -9.81, 0.0] points sideways: for things to fall down, use gravity = [0.0, 0.0, -9.81]",
+    );
+    assert_warns(
+        &format!("gravity = [2, 0.1, 0]\n{PAIR}"),
+        "up is \"y\", but gravity = [2.0, 0.1, 0.0] points sideways",
+    );
+    // A slope, weightlessness, and gravity along z.
+    for calm in
+        ["gravity = [9, -2, 0]", "gravity = [0, 0, 0]", "up = \"z\"\ngravity = [0, 0, -9.81]"]
+    {
+        assert_eq!(warnings(&format!("{calm}\n{PAIR}")), Vec::<String>::new());
+    }
+}
+
+#[test]
+fn particles_of_several_shapes_in_one_place_cause_a_warning() {
+    let apart =
+        "and nothing holds them together: move them apart, or join each two by a constraint";
+    let particle = |x: u32, more: &str| format!("[[particle]]\nposition = [{x}, 0, 0]\n{more}");
+    let two = format!("{}{}{}", particle(1, ""), particle(2, ""), particle(1, ""));
+    let expected = format!(
+        "1 particle starts where another one does (particle 2 where particle 0 is), {apart}"
+    );
+    assert_eq!(warnings(&two), [expected]);
+    assert_eq!(
+        warnings(&format!("{two}[[constraint]]\nparticles = [0, 2]\n")),
+        Vec::<String>::new()
+    );
+    assert_eq!(warnings(&particle(1, "pinned = true\n").repeat(3)), Vec::<String>::new());
+    // The second sheet was copied, and not moved.
+    let expected = format!(
+        "generate[1]: all of its 25 particles start where another one does (particle 25 where particle 0 is), {apart}"
+    );
+    assert_eq!(warnings(&SHEET.repeat(2)), [expected]);
+    let beside = SHEET.replace("origin = [0,", "origin = [0.4,");
+    let expected = format!(
+        "generate[1]: 5 of its 25 particles start where another one does (particle 25 where particle 4 is), {apart}"
+    );
+    assert_eq!(warnings(&format!("{SHEET}{beside}")), [expected]);
+    let seam =
+        |row: u32| format!("[[constraint]]\nparticles = [{}, {}]\n", 5 * row + 4, 25 + 5 * row);
+    let sewn: String = (0..5).map(seam).collect();
+    assert_eq!(warnings(&format!("{sewn}{SHEET}{beside}")), Vec::<String>::new());
+}
+
+#[test]
 fn a_damping_that_leaves_nothing_of_a_velocity_causes_a_warning() {
     let scene = |damping: f32| {
         format!("[solver]\nrate_hz = 240\nsubsteps = 4\ndamping = {damping}\n{SHEET}")

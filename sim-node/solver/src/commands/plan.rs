@@ -161,10 +161,14 @@ mod tests {
         assert!(!plan.has_new_constraints);
         solver.offer(plan.prepare(None));
         // Another distance than that of the offer.
+        let is_offered = |solver: &Solver, thickness| {
+            let offered = solver.offered.as_ref().unwrap().particle_contacts.as_ref().unwrap();
+            offered.are_derived_from(Some(thickness))
+        };
         solver.apply(1, &set(0.03)).unwrap();
-        assert!(!solver.accept_particle_contacts());
+        assert!(is_offered(&solver, 0.02), "not taken over");
         solver.apply(1, &set(0.02)).unwrap();
-        assert!(solver.accept_particle_contacts());
+        assert!(is_offered(&solver, 0.03), "exchanged");
         assert!(solver.particle_contacts.are_derived_from(Some(0.02)));
         assert!(solver.plan([set(0.02)]).is_none());
     }

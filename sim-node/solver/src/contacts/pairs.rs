@@ -164,6 +164,12 @@ impl ParticleContacts {
         !self.particles.is_empty()
     }
 
+    /// True if more neighbours are near each other at load than the lists of pairs that never touch have room for: further
+    /// ones would repel each other.
+    pub(crate) fn are_overfull(&self) -> bool {
+        self.load_pairs.is_overfull || self.surfaces.are_overfull()
+    }
+
     /// True if these contacts were derived for this contact distance.
     pub(crate) fn are_derived_from(&self, thickness: Option<f32>) -> bool {
         self.thickness.to_bits() == thickness.unwrap_or(0.0).to_bits()

@@ -23,7 +23,7 @@ impl Scene {
             settings::listed_order(self),
             settings::no_tether_root(self, &model),
             settings::excessive_damping(self),
-            settings::upside_down(self),
+            settings::gravity_not_down(self),
             settings::gravity_of_meters(self),
             settings::wind_without_surface(self, &model),
             settings::fast_contacts(self, &model),
@@ -39,7 +39,9 @@ impl Scene {
         let mut warnings: Vec<_> = all.into_iter().flatten().collect();
         warnings.extend(contacts::across_mesh(self, &model));
         warnings.extend(contacts::within_distance(self, &model));
+        warnings.extend(particles::coincident(self, &model));
         warnings.extend(contacts::thickness(self, &model));
+        warnings.extend(contacts::overfull(self, &model));
         warnings.extend(bending::unreached(self, &model));
         warnings.extend(bending::missing_hinges(self));
         warnings.extend(shapes::without_length(self));

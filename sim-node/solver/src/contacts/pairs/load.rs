@@ -9,7 +9,8 @@ use crate::scene::model::Model;
 /// Particles of one connected body never touch if they are nearer than this at load, in contact
 /// distances: a fold of two layers is a half circle of pi / 2 = 1.57.
 pub(crate) const CONNECTED_REACH: f32 = 1.6;
-/// Largest number of near pairs at load for each particle, on average. Further pairs touch as all others.
+/// Largest number of near pairs at load for each particle, on average. It bounds memory. Further pairs touch as all
+/// others, so a contact distance with more of them is refused.
 const PAIRS_PER_PARTICLE: usize = 32;
 
 /// Returns the particles that take part in contacts in the order of their slots. Each tile, and each node
@@ -111,6 +112,8 @@ pub(super) struct LoadPairs {
     never: PairMasks,
     /// Pairs that touch at another distance, ascending, and the distance.
     closer: Vec<([u32; 2], f32)>,
+    /// True if there were more near pairs than the list has room for.
+    pub(super) is_overfull: bool,
 }
 
 /// A set of pairs of a slot and an entry of a tile.
@@ -153,7 +156,10 @@ impl LoadPairs {
         let query = Query { times: [0.0; 2], distance: CONNECTED_REACH * thickness };
         let count_max = PAIRS_PER_PARTICLE * slots.len();
         let (mut never, mut closer) = (Vec::new(), Vec::new());
-        let _is_complete = tree.search(query, kernels, except, &mut |pair| {
+        let found = tree.search(query, kernels, except, &mut |pair| {
+            if never.len() + closer.len() == count_max {
+                return Search::Break(());
+            }
             let [a, b] = pair.map(|slot| slots[slot as usize]);
             let apart = model.distance(a, b);
             if bodies[a as usize] == bodies[b as usize] || apart == 0.0 {
@@ -161,21 +167,20 @@ impl LoadPairs {
             } else if apart < thickness {
                 closer.push((pair, apart));
             }
-            let is_full = never.len() + closer.len() >= count_max;
-            if is_full { Search::Break(()) } else { Search::Continue(()) }
+            Search::Continue(())
         });
-        Self::from_pairs(never, closer, slots.len())
+        Self::from_pairs(never, closer, (slots.len(), found))
     }
 
     /// Enters pairs of a slot and an entry of a tile: those that never touch, and those that touch at
-    /// another distance.
+    /// another distance. The search has broken off where the list was full.
     pub(super) fn from_pairs(
         never: Vec<[u32; 2]>,
         mut closer: Vec<([u32; 2], f32)>,
-        slot_count: usize,
+        (slot_count, search): (usize, Search),
     ) -> Self {
         closer.sort_unstable_by_key(|(pair, _)| *pair);
-        Self { never: PairMasks::new(never, slot_count), closer }
+        Self { never: PairMasks::new(never, slot_count), closer, is_overfull: search.is_break() }
     }
 
     /// Returns a bit for each entry of a tile that a slot never touches, for each slot of a tile.

@@ -40,7 +40,8 @@ use touching::{TouchWork, Touching};
 pub(super) use triangle_tiles::SurfaceSearch;
 use triangle_tiles::{AtLoad, TriangleTiles, Wanted};
 
-/// Largest number of triangles that a particle never touches, on average. Further ones touch it as all others.
+/// Largest number of triangles that a particle never touches, on average. Further ones touch it as all others, so a
+/// contact distance with more of them is refused.
 const NEVER_PER_PARTICLE: usize = 128;
 
 /// Fewest candidates that a worker examines.
@@ -125,6 +126,11 @@ impl SurfaceContacts {
         self.near_tiles.resize_with(count, NearTiles::new);
         self.kept.set_worker_count(count);
         self.near.set_worker_count(count);
+    }
+
+    /// True if more triangles are near particles at load than the list has room for.
+    pub(super) fn are_overfull(&self) -> bool {
+        self.load_pairs.is_overfull
     }
 
     pub(super) fn are_on(&self) -> bool {
@@ -245,7 +251,10 @@ fn near_at_load(
     let (roots, mut near_tiles) = (&tiles.roots.pairs, NearTiles::new());
     let start = (roots.as_slice(), &mut near_tiles);
     let all = (surface, search, Wanted::All);
-    let _is_complete = tiles.search(start, all, &|_| AtLoad::default(), &mut |pair| {
+    let found = tiles.search(start, all, &|_| AtLoad::default(), &mut |pair| {
+        if never.len() + closer.len() == count_max {
+            return Search::Break(());
+        }
         let [slot, triangle] = pair;
         let corners = surface.place(triangle, View { particles: states, slot, time: 0.0 });
         let apart = Nearest::new(corners).mean(corners).length();
@@ -255,10 +264,9 @@ fn near_at_load(
         } else if apart < thickness {
             closer.push((pair, apart));
         }
-        let is_full = never.len() + closer.len() >= count_max;
-        if is_full { Search::Break(()) } else { Search::Continue(()) }
+        Search::Continue(())
     });
-    LoadPairs::from_pairs(never, closer, particles.len())
+    LoadPairs::from_pairs(never, closer, (particles.len(), found))
 }
 
 /// Returns, for each slot, the triangles that it may touch and that have an edge with one that it never touches.

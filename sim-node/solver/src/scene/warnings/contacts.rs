@@ -10,9 +10,10 @@ use crate::contacts::colliders::Collider;
 use crate::contacts::contact_substep::{ContactSubstep, Interval};
 use crate::contacts::mesh::near::NearMeshes;
 use crate::contacts::mesh::{PUSHES_MAX, PlacedMesh, Stop};
-use crate::contacts::pairs::CONNECTED_REACH;
+use crate::contacts::pairs::{CONNECTED_REACH, ParticleContacts};
 use crate::contacts::path::SubstepPath;
 use crate::contacts::solid::{Solid, solids};
+use crate::kernels::Kernels;
 use crate::scene::definition::Scene;
 use crate::scene::definition::collider::{ColliderGeometry, SceneCollider};
 use crate::scene::definition::contact::ContactMode;
@@ -213,6 +214,21 @@ pub(super) fn thickness(scene: &Scene, model: &Model) -> Vec<String> {
         ))
     };
     scene.generators.iter().enumerate().filter_map(sentence).collect()
+}
+
+/// Warns of a thickness within which there are more neighbours at load than the solver can keep apart.
+pub(super) fn overfull(scene: &Scene, model: &Model) -> Option<String> {
+    let thickness = scene.contact.distance()?;
+    let (mode, kernels) = (scene.contact.mode, Kernels::best());
+    ParticleContacts::new(model, mode, Some(thickness), kernels).are_overfull().then(|| {
+        format!(
+            "contact.thickness: at load, each particle has more than 32 other particles or 128 triangles, on average, \
+             within {} {unit}, 1.6 times the thickness: some of them repel each other from the first step on; use a \
+             smaller thickness",
+            three_digits(f64::from(CONNECTED_REACH * thickness)),
+            unit = scene.unit,
+        )
+    })
 }
 
 /// Returns `true` for shapes without holes of their own, so that nothing should pass between their particles.

@@ -58,6 +58,86 @@ pub(super) fn pinned_and_anchored(scene: &Scene, model: &Model) -> Option<String
     Some(format!("particle {particle} is pinned and follows an anchor: the pin has no effect"))
 }
 
+/// By particle: true if it is pinned or follows an anchor.
+fn are_fixed(scene: &Scene, model: &Model) -> Vec<bool> {
+    let mut is_fixed: Vec<_> = model.particles.iter().map(|particle| particle.pinned).collect();
+    for particle in scene.anchors.iter().flat_map(|anchor| &anchor.particles) {
+        is_fixed[*particle as usize] = true;
+    }
+    is_fixed
+}
+
+/// Particles of a shape, or explicit ones, that start where particles of others do.
+#[derive(Default)]
+struct Coincident {
+    count: u32,
+    /// The first of them, and the other particle at its place.
+    first: Option<[u32; 2]>,
+    is_any_free: bool,
+}
+
+/// Warns of particles that start where explicit particles or particles of other shapes do: one sentence for the
+/// explicit ones, and one for each shape. Particles that a constraint joins where they are may coincide, and so may
+/// fixed ones.
+pub(super) fn coincident(scene: &Scene, model: &Model) -> Vec<String> {
+    let explicit_count = scene.particles.len() as u64;
+    let counts = scene.generators.iter().map(|one| one.shape.particle_count());
+    let counts: Vec<_> = std::iter::once(explicit_count).chain(counts).collect();
+    let ends: Vec<_> = counts
+        .iter()
+        .scan(0, |end, count| {
+            *end += count;
+            Some(*end)
+        })
+        .collect();
+    let block = |particle: u32| ends.partition_point(|end| *end <= u64::from(particle));
+    let mut is_joined = vec![false; model.particles.len()];
+    for [a, b] in model.pairs().filter(|[a, b]| model.distance(*a, *b) == 0.0) {
+        (is_joined[a as usize], is_joined[b as usize]) = (true, true);
+    }
+    let is_fixed = are_fixed(scene, model);
+    let place = |particle: &u32| {
+        model.particles[*particle as usize].position.map(|axis| (axis + 0.0).to_bits())
+    };
+    let mut particles: Vec<_> = (0..model.particle_count()).collect();
+    particles.sort_unstable_by_key(|particle| (place(particle), *particle));
+    let mut found: Vec<_> = counts.iter().map(|_| Coincident::default()).collect();
+    for group in particles.chunk_by(|a, b| place(a) == place(b)) {
+        let (first, others) = (group[0], group[1..].iter().copied());
+        let is_explicit = block(first) == 0;
+        let are_apart = |other: u32| is_explicit || block(other) != block(first);
+        for other in others.filter(|other| are_apart(*other) && !is_joined[*other as usize]) {
+            let coincident = &mut found[block(other)];
+            coincident.count += 1;
+            let pair = [other, first];
+            coincident.first = coincident.first.map(|one| one.min(pair)).or(Some(pair));
+            coincident.is_any_free |= pair.iter().any(|one| !is_fixed[*one as usize]);
+        }
+    }
+    let found = found.into_iter().zip(counts).enumerate();
+    found.filter_map(|(block, (one, count))| coincident_sentence(block, &one, count)).collect()
+}
+
+/// `count` is the number of particles of the block, of which the first one is that of the explicit particles.
+fn coincident_sentence(block: usize, one: &Coincident, count: u64) -> Option<String> {
+    let [other, first] = one.first.filter(|_| one.is_any_free)?;
+    let particles = match (block.checked_sub(1), one.count) {
+        (None, 1) => "1 particle starts".to_owned(),
+        (None, number) => format!("{number} particles start"),
+        (Some(index), number) if u64::from(number) == count => {
+            format!("generate[{index}]: all of its {number} particles start")
+        }
+        (Some(index), 1) => format!("generate[{index}]: 1 of its {count} particles starts"),
+        (Some(index), number) => {
+            format!("generate[{index}]: {number} of its {count} particles start")
+        }
+    };
+    Some(format!(
+        "{particles} where another one does (particle {other} where particle {first} is), and nothing holds them \
+         together: move them apart, or join each two by a constraint"
+    ))
+}
+
 /// A free particle inside a collider at load.
 struct Inside {
     particle: usize,
@@ -67,10 +147,7 @@ struct Inside {
 
 /// Names the deepest particle, because it is pushed farthest.
 pub(super) fn inside_collider(scene: &Scene, model: &Model) -> Option<String> {
-    let mut is_fixed: Vec<_> = model.particles.iter().map(|particle| particle.pinned).collect();
-    for particle in scene.anchors.iter().flat_map(|anchor| &anchor.particles) {
-        is_fixed[*particle as usize] = true;
-    }
+    let is_fixed = are_fixed(scene, model);
     let free = (0..is_fixed.len()).filter(|particle| !is_fixed[*particle]);
     let is_planar = scene.dimensions == 2;
     let colliders: Vec<_> =

@@ -31,14 +31,33 @@ pub(super) fn excessive_damping(scene: &Scene) -> Option<String> {
     })
 }
 
-pub(super) fn upside_down(scene: &Scene) -> Option<String> {
-    let [_, y, z] = scene.gravity;
+/// Part of gravity along `up` below which things do not fall down, but sideways: 5 degrees.
+const DOWN_MIN: f32 = 0.1;
+
+/// Gravity that points up or sideways, such as the default in a scene with z up.
+pub(super) fn gravity_not_down(scene: &Scene) -> Option<String> {
+    let [x, y, z] = scene.gravity;
+    let size = (x * x + y * y + z * z).sqrt();
     let (name, along) = match scene.up {
         Up::Y => ("y", y),
         Up::MinusY => ("-y", -y),
         Up::Z => ("z", z),
     };
-    (along > 0.0).then(|| format!("up is \"{name}\", but gravity points up, too: things fall up"))
+    if along > DOWN_MIN * size {
+        return Some(format!("up is \"{name}\", but gravity points up, too: things fall up"));
+    }
+    // Without gravity, nothing falls.
+    (along > -DOWN_MIN * size).then(|| {
+        let down = match scene.up {
+            Up::Y => [0.0, -size, 0.0],
+            Up::MinusY => [0.0, size, 0.0],
+            Up::Z => [0.0, 0.0, -size],
+        };
+        format!(
+            "up is \"{name}\", but gravity = {:?} points sideways: for things to fall down, use gravity = {down:?}",
+            scene.gravity
+        )
+    })
 }
 
 /// Gravity in m/s² in a scene with another unit of length.

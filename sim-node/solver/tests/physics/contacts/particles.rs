@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use sim_solver::{ParameterValue, Solver};
+use sim_solver::{ParameterValue, Reason, Solver};
 
 use super::super::{assert_at_most, assert_near, rates, solver, step, stepped};
 use super::cloths::{
@@ -179,6 +179,27 @@ fn particles_in_one_point_stay_finite_and_disturb_nobody() {
     assert_eq!(pile.particle(2000).velocity, healthy.velocity);
     assert!(pile.contact_overflow_count() > 0, "all pairs fit");
     assert_eq!(pile.frozen_count(), 0);
+}
+
+/// Neighbours beyond the room of the list of pairs that never touch would repel each other.
+#[test]
+fn a_contact_distance_with_too_many_neighbours_at_load_is_refused_and_changes_no_bit() {
+    for mode in ["off", "particles", "surfaces"] {
+        let text = format!(
+            "gravity = [0, 0, 0]\n[contact]\nmode = \"{mode}\"\n[[generate]]\nshape = \"cloth\"\ncolumns = 24\n\
+             rows = 24\nspacing = 0.05\npinned = \"none\"\n"
+        );
+        let mut solver = solver(&text);
+        step(&mut solver, 2);
+        let before = (solver.particles().to_vec(), solver.parameter_values());
+        let mut set = |thickness| solver.set("contact", ParameterValue::Number(thickness), None);
+        assert_eq!(set(0.2), Err(Reason::OutOfRange), "{mode}");
+        assert_eq!(set(1e6), Err(Reason::OutOfRange), "{mode}");
+        assert_eq!((solver.particles().to_vec(), solver.parameter_values()), before);
+        solver.set("contact", ParameterValue::Number(0.1), None).unwrap();
+        step(&mut solver, 20);
+        assert_eq!(solver.particles(), before.0, "{mode}: neighbours repel each other");
+    }
 }
 
 #[test]

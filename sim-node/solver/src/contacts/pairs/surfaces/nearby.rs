@@ -152,7 +152,7 @@ mod tests {
         let (surface, particles) = surface_of(&sheet(4, 0.5));
         let (mut random, tree) = (Random(1), TileTree::new(16));
         let never = (0..16).map(|slot| [slot, (5 * slot) % 18]).collect();
-        let load_pairs = LoadPairs::from_pairs(never, Vec::new(), 16);
+        let load_pairs = LoadPairs::from_pairs(never, Vec::new(), (16, Search::Continue(())));
         let mut face_count = 0;
         for _ in 0..200 {
             let states = [0; 16].map(|_| PackedParticle([0; 8].map(|_| random.number())));
