@@ -392,7 +392,9 @@ impl ParticleStore {
         let Self { graph, patches, triangles, .. } = self;
         if are_changed {
             graph.follow_triangles(triangles);
-            patches.iter_mut().for_each(|patch| patch.follow_triangles(triangles));
+            for patch in &mut *patches {
+                patch.follow_triangles(triangles);
+            }
         }
         graph.blow(kernels, wind);
         for patch in patches {

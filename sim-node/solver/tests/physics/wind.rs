@@ -269,7 +269,9 @@ fn wind_that_rises_later_passes_through_torn_triangles() {
     let text = triangle("velocity = [0, 0, 0]\ndrag = 0", 1000);
     let mut solver = solver(&text);
     let constraints: Vec<_> = (0..).zip(solver.constraints()).map(|(index, _)| index).collect();
-    constraints.into_iter().for_each(|one| solver.cut(one).unwrap());
+    for constraint in constraints {
+        solver.cut(constraint).unwrap();
+    }
     step(&mut solver, 3);
     solver.set("wind_velocity", sim_solver::ParameterValue::Vector([0.0, 0.0, 2.0]), None).unwrap();
     solver.set("wind_drag", sim_solver::ParameterValue::Number(1.0), None).unwrap();

@@ -64,9 +64,9 @@ impl GraphSurface {
         for (group, triangles) in groups.iter_mut().zip(triangles.chunks(8)) {
             for (lane, triangle) in triangles.iter().enumerate() {
                 let is_whole = is_whole(*triangle);
+                let share = |count: f32| if is_whole { 1.0 / count } else { 0.0 };
                 for (particles, shares_max) in group.particles.iter().zip(&mut group.shares_max) {
-                    let count = counts[particles[lane] as usize];
-                    shares_max[lane] = if is_whole { 1.0 / count } else { 0.0 };
+                    shares_max[lane] = share(counts[particles[lane] as usize]);
                 }
             }
         }

@@ -59,7 +59,7 @@ impl TornCells {
                 let place = row * *row_length + MARGIN + column - 1;
                 for torn in [&mut lower[place], &mut upper[place]] {
                     let is_torn = !triangles.is_whole(triangle);
-                    *torn = if is_torn { 1.0 } else { 0.0 };
+                    *torn = f32::from(u8::from(is_torn));
                     *are_any |= is_torn;
                     triangle += 1;
                 }
