@@ -21,7 +21,7 @@ pub fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
     };
     let of_part = || known.iter().find(|(plain, _)| is_part(plain)).map(|(_, one)| *one);
     typed
-        .filter(|(distance, _)| *distance <= (length / 3).max(1))
+        .filter(|(distance, _)| *distance <= length / 3)
         .map(|(_, one)| one)
         .or_else(of_part)
 }
