@@ -23,7 +23,7 @@ use sim_solver::builtin;
 use sim_solver::scene::is_path;
 
 pub(crate) use bench::{BenchArgs, BenchClientArgs, ClientRole};
-pub(crate) use command::{CommandVerb, PoseArgs, RewindArgs, SetArgs};
+pub(crate) use command::{CommandVerb, FollowArgs, PoseArgs, RewindArgs, SetArgs};
 pub(crate) use ctl::{CtlArgs, CtlVerb, QueryVerb, WatchArgs};
 pub(crate) use domain::{DoctorArgs, PsArgs};
 use endpoint::EndpointArgs;

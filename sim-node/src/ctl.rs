@@ -24,8 +24,8 @@ pub(crate) fn ctl(args: &CtlArgs) -> anyhow::Result<Exit> {
     match &args.verb {
         CtlVerb::Command(verb) => {
             let mut client = attach()?;
-            let action = action::from_verb(verb, || rate_hz(&mut client, args))?;
-            command::send(&mut client, args, action)
+            let actions = action::from_verb(verb, || rate_hz(&mut client, args))?;
+            command::send(&mut client, args, &actions)
         }
         CtlVerb::Query(query) => answer(&mut attach()?, args, query).map(|()| Exit::Done),
         CtlVerb::Watch(options) => watch::watch(args, options).map(|()| Exit::Done),

@@ -199,7 +199,7 @@ fn action(held: &HeldState, rng: &mut Rng) -> Action {
         // They change every constraint, which a node prepares beside the loop if there are many.
         9 => set("compliance", rng.f32() * 1e-4),
         10 => set("tear_stretch", 2.0 + rng.f32()),
-        _ => Action::Grab { particle, target, over_s: 0.05 },
+        _ => Action::Grab { particle, target, over_s: rng.f32() * 0.5 },
     }
 }
 

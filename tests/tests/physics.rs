@@ -264,7 +264,7 @@ fn another_process_commands_the_physics_through_the_client() {
     let mut client = attach(&sandbox);
     let turn = [0.0, 0.0, 0.0, 1.0];
     let move_anchor =
-        Action::MoveAnchor { anchor: 0, translation: [0.0, 0.1, 0.0], rotation: turn };
+        Action::MoveAnchor { anchor: 0, translation: [0.0, 0.1, 0.0], rotation: turn, over_s: 0.0 };
     let outcome = client.request(move_anchor, DEADLINE).unwrap();
     assert!(outcome.is_applied());
     let snapshot = loop {

@@ -1,7 +1,7 @@
 //! Command files: one JSON object per line. The rows of `/outcomes` are such lines.
 
 use serde_json::{Map, Value};
-use sim_contract::{Action, ActionFields, PlainF32, Text};
+use sim_contract::{Action, ActionFields, PathPart, PathPoint, PlainF32, Text};
 
 /// A command and the step in which it takes effect.
 #[derive(Debug, Clone, PartialEq)]
@@ -62,11 +62,11 @@ pub fn parse_commands(text: &str, label: &str) -> Result<Vec<TimedCommand>, Comm
         if text.trim().is_empty() {
             continue;
         }
-        let command = parse_line(text, line).map_err(|error| {
+        let of_line = parse_line(text, line).map_err(|error| {
             let label = label.to_owned();
             CommandFileError { label, line, error }
         })?;
-        commands.push(command);
+        commands.extend(of_line);
     }
     sort_commands(&mut commands);
     Ok(commands)
@@ -93,22 +93,22 @@ pub fn sort_commands(commands: &mut [TimedCommand]) {
     }
 }
 
-fn parse_line(text: &str, line: usize) -> Result<TimedCommand, FieldError> {
+/// Parses the command of a line; a long path becomes several.
+fn parse_line(text: &str, line: usize) -> Result<Vec<TimedCommand>, FieldError> {
     let Ok(Value::Object(fields)) = serde_json::from_str(text) else {
         let example = r#"an object such as {"step":1,"kind":"pin","particle":0}"#;
         return Err(invalid("line", "is not a JSON object", example));
     };
     let step = integer(&fields, "step", 1)?;
-    Ok(TimedCommand {
-        step: step.ok_or_else(|| missing("step", "whole numbers from 1"))?,
-        index: integer(&fields, "index", 0)?,
-        client_id: integer(&fields, "client_id", 0)?.unwrap_or(0),
-        sequence: integer(&fields, "sequence", 0)?.unwrap_or(line as u64),
-        action: action(&fields)?,
-    })
+    let step = step.ok_or_else(|| missing("step", "whole numbers from 1"))?;
+    let index = integer(&fields, "index", 0)?;
+    let client_id = integer(&fields, "client_id", 0)?.unwrap_or(0);
+    let sequence = integer(&fields, "sequence", 0)?.unwrap_or(line as u64);
+    let command = |action| TimedCommand { step, index, client_id, sequence, action };
+    Ok(actions(&fields)?.into_iter().map(command).collect())
 }
 
-fn action(fields: &Map<String, Value>) -> Result<Action, FieldError> {
+fn actions(fields: &Map<String, Value>) -> Result<Vec<Action>, FieldError> {
     let Some(name) = fields.get("kind") else {
         return Err(missing("kind", &kind_names()));
     };
@@ -143,10 +143,27 @@ fn action(fields: &Map<String, Value>) -> Result<Action, FieldError> {
     }
     let own_fields =
         fields.iter().filter(|(name, _)| *name == "kind" || own().any(|own| own == *name));
-    let object = own_fields.map(|(name, value)| (name.clone(), value.clone())).collect();
+    let mut object: Map<_, _> =
+        own_fields.map(|(name, value)| (name.clone(), value.clone())).collect();
+    let points = object.get("path").and_then(points).unwrap_or_default();
+    if points.len() > PathPart::POINTS_MAX {
+        object.insert("path".to_owned(), Value::Array(Vec::new()));
+    }
     // All fields are valid. The error of serde would name internal types.
-    serde_json::from_value(Value::Object(object))
-        .map_err(|_| invalid("line", "is not a command", &kind_names()))
+    match serde_json::from_value(Value::Object(object)) {
+        Ok(Action::Follow { object, object_index, append, .. })
+            if points.len() > PathPart::POINTS_MAX =>
+        {
+            Ok(Action::follow(object, object_index, &points, append))
+        }
+        Ok(action) => Ok(vec![action]),
+        Err(_) => Err(invalid("line", "is not a command", &kind_names())),
+    }
+}
+
+/// The points of a path.
+fn points(path: &Value) -> Option<Vec<PathPoint>> {
+    serde_json::from_value(path.clone()).ok()
 }
 
 fn integer(fields: &Map<String, Value>, name: &str, min: u64) -> Result<Option<u64>, FieldError> {
@@ -172,6 +189,9 @@ fn is_valid(kind: &str, name: &str, value: &Value) -> bool {
         "force" if kind == "release" => value.is_boolean(),
         "target" | "center" | "delta" | "from" | "to" | "direction" | "translation"
         | "velocity" | "angular_velocity" | "force" | "torque" => are_numbers(3),
+        "path" => points(value).is_some(),
+        "append" => value.is_boolean(),
+        "object" => ["particle", "anchor", "collider"].iter().any(|object| value == object),
         "to_step" => value.is_u64(),
         "contents" => value == "state" || value == "motion",
         "state_hash" => value.as_str().is_some_and(|text| u64::from_str_radix(text, 16).is_ok()),
@@ -196,6 +216,9 @@ fn allowed_values(kind: &str, name: &str) -> &'static str {
         "force" if kind == "release" => "true or false",
         "force" => "three numbers in N",
         "torque" => "three numbers in N m",
+        "path" => "points such as {\"time\":0.5,\"translation\":[0,0.1,0],\"rotation\":[0,0,0,1]}",
+        "append" => "true or false",
+        "object" => "particle, anchor or collider",
         "to_step" => "whole numbers from 0",
         "contents" => "state or motion",
         "state_hash" => "16 hex digits in a string",
@@ -283,6 +306,26 @@ mod tests {
     }
 
     #[test]
+    fn a_long_path_becomes_a_chain_of_commands() {
+        let points: Vec<_> = (1..=9)
+            .map(|time| format!(r#"{{"time":{time},"translation":[0,{time},0]}}"#))
+            .collect();
+        let line = format!(
+            r#"{{"step":5,"kind":"follow","object":"anchor","object_index":3,"path":[{}]}}"#,
+            points.join(",")
+        );
+        let commands = parse_commands(&line, "x").unwrap();
+        let parts: Vec<_> = commands
+            .iter()
+            .map(|command| match command.action {
+                Action::Follow { path, append, .. } => (command.step, path.points().len(), append),
+                other => panic!("{other:?}"),
+            })
+            .collect();
+        assert_eq!(parts, [(5, 4, false), (5, 4, true), (5, 1, true)]);
+    }
+
+    #[test]
     fn every_error_names_its_line_and_field() {
         let wrong = [
             "nonsense",
@@ -312,6 +355,8 @@ mod tests {
             r#"{"step":1,"kind":"set","parameter":"bending","value":1,"block":-1}"#,
             r#"{"step":1,"kind":"rewind"}"#,
             r#"{"step":1,"kind":"load","scene":null}"#,
+            r#"{"step":1,"kind":"follow","object":"rope","object_index":0,"path":[]}"#,
+            r#"{"step":1,"kind":"follow","object":"anchor","object_index":0,"path":[{"time":1}]}"#,
         ];
         let errors: Vec<_> = wrong.map(|line| error(&format!("\n{line}"))).into();
         insta::assert_snapshot!(errors.join("\n"), @r#"
@@ -320,8 +365,8 @@ mod tests {
         drag.jsonl:2: step: is missing (allowed: whole numbers from 1)
         drag.jsonl:2: step: 0 is invalid (allowed: whole numbers from 1)
         drag.jsonl:2: step: 1.5 is invalid (allowed: whole numbers from 1)
-        drag.jsonl:2: kind: is missing (allowed: pin, unpin, grab, move, release, pause, resume, step, reset, push, cut, cut_radius, cut_segment, move_anchor, move_collider, set, load, rewind, restore, mark, drive_body)
-        drag.jsonl:2: kind: "dance" is unknown (allowed: pin, unpin, grab, move, release, pause, resume, step, reset, push, cut, cut_radius, cut_segment, move_anchor, move_collider, set, load, rewind, restore, mark, drive_body)
+        drag.jsonl:2: kind: is missing (allowed: pin, unpin, grab, move, release, pause, resume, step, reset, push, cut, cut_radius, cut_segment, move_anchor, move_collider, set, load, rewind, restore, mark, drive_body, follow)
+        drag.jsonl:2: kind: "dance" is unknown (allowed: pin, unpin, grab, move, release, pause, resume, step, reset, push, cut, cut_radius, cut_segment, move_anchor, move_collider, set, load, rewind, restore, mark, drive_body, follow)
         drag.jsonl:2: particle: is missing (allowed: whole numbers 0..=4294967295)
         drag.jsonl:2: particle: -1 is invalid (allowed: whole numbers 0..=4294967295)
         drag.jsonl:2: colour: is not a field of "pin" (allowed: particle, step, kind, client_id, sequence, index, status, reason, disconnected, new_run)
@@ -342,6 +387,8 @@ mod tests {
         drag.jsonl:2: block: -1 is invalid (allowed: whole numbers 0..=4294967295)
         drag.jsonl:2: to_step: is missing (allowed: whole numbers from 0)
         drag.jsonl:2: scene: null is invalid (allowed: the name of a scene, at most 160 bytes)
+        drag.jsonl:2: object: "rope" is invalid (allowed: particle, anchor or collider)
+        drag.jsonl:2: path: [{"time":1}] is invalid (allowed: points such as {"time":0.5,"translation":[0,0.1,0],"rotation":[0,0,0,1]})
         "#);
     }
 }

@@ -79,6 +79,7 @@ pub(super) const COMMANDS: &str = r#"
     {"step":9,"kind":"cut_segment","from":[-0.05,0.4,0],"to":[0.25,0.4,0],"direction":[0,0,1]}
     {"step":11,"kind":"move_anchor","anchor":0,"translation":[0.05,0,0.05]}
     {"step":13,"kind":"move_collider","collider":2,"translation":[0,0,0.4],"rotation":[0,0,1,1]}
+    {"step":12,"kind":"move_collider","collider":1,"translation":[0,0.1,0],"over_s":0.3}
     {"step":14,"kind":"drive_body","collider":3,"translation":[0,0,-0.15],"velocity":[0,0,-1]}
     {"step":15,"kind":"grab","particle":60,"target":[0.5,0.2,0.3],"over_s":0.1}
     {"step":17,"kind":"move","particle":60,"target":[0.5,0.5,0.8]}
@@ -118,6 +119,9 @@ pub(super) const COMMANDS: &str = r#"
     {"step":57,"kind":"set","parameter":"friction","value":0.75,"collider":1}
     {"step":57,"kind":"set","parameter":"restitution","value":0.5,"collider":0}
     {"step":58,"kind":"set","parameter":"contact","value":null}
+    {"step":58,"kind":"follow","object":"particle","object_index":60,"path":[{"time":0,"translation":[0.5,0.5,0.8]},{"time":0.5,"translation":[0.6,0.5,0.8]}]}
+    {"step":58,"kind":"follow","object":"anchor","object_index":0,"path":[{"time":0.05,"translation":[0,0.1,0]},{"time":0.1,"translation":[0,0,0],"rotation":[0,0,0.1,1]},{"time":0.15,"translation":[0,0.1,0]},{"time":0.2,"translation":[0,0,0]},{"time":0.25,"translation":[0,0,0.1]}]}
+    {"step":59,"kind":"follow","object":"collider","object_index":2,"path":[{"time":1,"translation":[0,0,0.2]}]}
     {"step":60,"kind":"release","particle":60}
     {"step":61,"kind":"mark","text":"the sleeve slips"}
     {"step":61,"kind":"mark","text":""}

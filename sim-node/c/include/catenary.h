@@ -45,7 +45,9 @@
 #define CATENARY_OPTION_STATE 256  // a restore has a complete state
 #define CATENARY_OPTION_MOTION 512  // a restore has positions and velocities
 #define CATENARY_OPTION_BLOCK 1024  // a set is for one generated block
-#define CATENARY_OPTION_COLLIDER 2048  // a set is for one collider
+#define CATENARY_OPTION_COLLIDER 2048  // a set is for one collider; a follow moves a collider
+#define CATENARY_OPTION_ANCHOR 4096  // a follow moves an anchor
+#define CATENARY_OPTION_APPEND 8192  // a follow appends its points
 
 
 // Result of a call. `catenary_last_error` describes every other result than `CATENARY_OK`.
@@ -331,14 +333,15 @@ typedef struct catenary_client catenary_client;
 // | 11 cut | constraint | | |
 // | 12 cut_radius | | center | `number` radius |
 // | 13 cut_segment | | from, to, direction | |
-// | 14 move_anchor | anchor | translation | `rotation` |
-// | 15 move_collider | collider | translation | `rotation` |
+// | 14 move_anchor | anchor | translation | `rotation`, `number` over_s |
+// | 15 move_collider | collider | translation | `rotation`, `number` over_s |
 // | 16 set | block or collider | value, if a vector | `text` parameter, `number` value, `count` constraint kind |
 // | 17 load | | | `text` scene |
 // | 18 rewind | step, low 32 bits | | `count` step, high 32 bits; or `CATENARY_OPTION_BACK` and `count` steps |
 // | 19 restore | hash, low 32 bits | | `count` hash, high 32 bits; `CATENARY_OPTION_STATE` or `CATENARY_OPTION_MOTION` |
 // | 20 mark | | | `text` |
 // | 21 drive_body | collider | translation, velocity, angular velocity | `rotation`, `Command::wrench` |
+// | 22 follow | particle, anchor or collider | | `CATENARY_OPTION_ANCHOR` or `CATENARY_OPTION_COLLIDER`, else a particle; `CATENARY_OPTION_APPEND`; `count` `Command::points` |
 typedef struct {
   // Number of the action in the table above.
   uint32_t kind;
@@ -353,16 +356,17 @@ typedef struct {
   float vectors[3][3];
   // Quaternion x, y, z, w.
   float rotation[4];
-  // Time of grab and move in seconds, radius of push and `cut_radius`, value of set.
+  // Time of grab, move, `move_anchor` and `move_collider` in seconds, radius of push and `cut_radius`, value of set.
   float number;
   // Limit of push, if `CATENARY_OPTION_LIMIT` is set.
   float limit;
-  // Number of steps of step; `catenary_constraint_kind` of set, if
+  // Number of steps of step; number of points of follow; `catenary_constraint_kind` of set, if
   // `CATENARY_OPTION_CONSTRAINT_KIND` is set.
   uint32_t count;
   // `CommandOptions` bits.
   uint32_t options;
-  // UTF-8 text, padded with zeros; force and torque of `drive_body`, see `Command::wrench`.
+  // UTF-8 text, padded with zeros; force and torque of `drive_body`, see `Command::wrench`; points of `follow`, see
+  // `Command::points`.
   uint8_t text[CATENARY_TEXT_SIZE_BYTES_MAX];
   // Always 0.
   uint32_t spare;
@@ -890,7 +894,7 @@ catenary_command catenary_command_pin(uint32_t particle);
 catenary_command catenary_command_unpin(uint32_t particle);
 
 // Grabs a particle, and drives it on a straight line to `target` (3 numbers, in m) within `over_s`
-// seconds, 0 to 0.25.
+// seconds, 0 to 3600.
 catenary_command catenary_command_grab(uint32_t particle, const float *target, float over_s);
 
 // Drives a particle that this client has grabbed to a new target, as in `catenary_command_grab`.
@@ -938,7 +942,7 @@ catenary_command catenary_command_cut_segment(const float *from,
                                               const float *to,
                                               const float *direction);
 
-// Moves an anchor to a pose by the end of the next step, where it stays. `translation` (3 numbers, in m)
+// Moves an anchor to a pose by the end of the next step, or within the time of `catenary_command_with_over`, where it stays. `translation` (3 numbers, in m)
 // and `rotation` (quaternion x, y, z, w) are relative to the pose at load. A null rotation is none.
 catenary_command catenary_command_move_anchor(uint32_t anchor,
                                               const float *translation,
@@ -949,6 +953,28 @@ catenary_command catenary_command_move_anchor(uint32_t anchor,
 catenary_command catenary_command_move_collider(uint32_t collider,
                                                 const float *translation,
                                                 const float *rotation);
+
+// Gives a `catenary_command_move_anchor` or `catenary_command_move_collider` the time in which it reaches its pose, in
+// seconds: 0 to 3600, rounded up to whole steps, at least one. Other commands stay as they are.
+catenary_command catenary_command_with_over(catenary_command command,
+                                            float over_s);
+
+// Leads an anchor (`object` is `CATENARY_OPTION_ANCHOR`), a collider (`CATENARY_OPTION_COLLIDER`) or a particle that this
+// client has grabbed (0) along the points of `catenary_command_with_point`.
+catenary_command catenary_command_follow(uint32_t object,
+                                         uint32_t object_index);
+
+// Adds a point to a `catenary_command_follow`, which has at most 4: the time in seconds after the step of the command that
+// begins the motion, ascending, and a pose as in `catenary_command_move_anchor`; for a particle a position, in m. A
+// fifth point or a null translation makes the empty command. Other commands stay as they are.
+catenary_command catenary_command_with_point(catenary_command follow,
+                                             double time_s,
+                                             const float *translation,
+                                             const float *rotation);
+
+// Appends the points of a `catenary_command_follow` to the motion that an earlier one began, and whose times go on. Other
+// commands stay as they are.
+catenary_command catenary_command_appended(catenary_command follow);
 
 // Moves a body through the next step, with its mass and inertia. `translation` and `rotation` are as in
 // `catenary_command_move_anchor`; `velocity` (m/s) and `angular_velocity` (rad/s) are those at the start of the step.

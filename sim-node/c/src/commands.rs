@@ -2,7 +2,10 @@
 
 use std::ffi::c_char;
 
-use sim_contract::{Action, Command, KindFilter, ParameterValue, Text};
+use sim_contract::{
+    Action, Command, CommandOptions, KindFilter, MovedObject, ParameterValue, PathPart, PathPoint,
+    Text,
+};
 
 use crate::pointers::{numbers, text};
 
@@ -29,7 +32,7 @@ pub extern "C" fn catenary_command_unpin(particle: u32) -> Command {
 }
 
 /// Grabs a particle, and drives it on a straight line to `target` (3 numbers, in m) within `over_s`
-/// seconds, 0 to 0.25.
+/// seconds, 0 to 3600.
 #[unsafe(no_mangle)]
 pub extern "C" fn catenary_command_grab(particle: u32, target: *const f32, over_s: f32) -> Command {
     command(numbers(target).map(|target| Action::Grab { particle, target, over_s }))
@@ -128,7 +131,7 @@ pub extern "C" fn catenary_command_cut_segment(
     command(all.map(|((from, to), direction)| Action::CutSegment { from, to, direction }))
 }
 
-/// Moves an anchor to a pose by the end of the next step, where it stays. `translation` (3 numbers, in m)
+/// Moves an anchor to a pose by the end of the next step, or within the time of `catenary_command_with_over`, where it stays. `translation` (3 numbers, in m)
 /// and `rotation` (quaternion x, y, z, w) are relative to the pose at load. A null rotation is none.
 #[unsafe(no_mangle)]
 pub extern "C" fn catenary_command_move_anchor(
@@ -137,7 +140,7 @@ pub extern "C" fn catenary_command_move_anchor(
     rotation: *const f32,
 ) -> Command {
     let rotation = numbers(rotation).unwrap_or(IDENTITY);
-    let action = |translation| Action::MoveAnchor { anchor, translation, rotation };
+    let action = |translation| Action::MoveAnchor { anchor, translation, rotation, over_s: 0.0 };
     command(numbers(translation).map(action))
 }
 
@@ -150,8 +153,72 @@ pub extern "C" fn catenary_command_move_collider(
     rotation: *const f32,
 ) -> Command {
     let rotation = numbers(rotation).unwrap_or(IDENTITY);
-    let action = |translation| Action::MoveCollider { collider, translation, rotation };
+    let action =
+        |translation| Action::MoveCollider { collider, translation, rotation, over_s: 0.0 };
     command(numbers(translation).map(action))
+}
+
+/// Gives a `catenary_command_move_anchor` or `catenary_command_move_collider` the time in which it reaches its pose, in
+/// seconds: 0 to 3600, rounded up to whole steps, at least one. Other commands stay as they are.
+#[unsafe(no_mangle)]
+pub extern "C" fn catenary_command_with_over(command: Command, over_s: f32) -> Command {
+    let action = match command.action() {
+        Action::MoveAnchor { anchor, translation, rotation, .. } => {
+            Action::MoveAnchor { anchor, translation, rotation, over_s }
+        }
+        Action::MoveCollider { collider, translation, rotation, .. } => {
+            Action::MoveCollider { collider, translation, rotation, over_s }
+        }
+        _ => return command,
+    };
+    Command::new(command.client_id, command.sequence, action)
+}
+
+/// Leads an anchor (`object` is `CATENARY_OPTION_ANCHOR`), a collider (`CATENARY_OPTION_COLLIDER`) or a particle that this
+/// client has grabbed (0) along the points of `catenary_command_with_point`.
+#[unsafe(no_mangle)]
+pub extern "C" fn catenary_command_follow(object: u32, object_index: u32) -> Command {
+    let object = match object {
+        0 => Some(MovedObject::Particle),
+        CommandOptions::ANCHOR => Some(MovedObject::Anchor),
+        CommandOptions::COLLIDER => Some(MovedObject::Collider),
+        _ => None,
+    };
+    let (path, append) = (PathPart::EMPTY, false);
+    command(object.map(|object| Action::Follow { object, object_index, path, append }))
+}
+
+/// Adds a point to a `catenary_command_follow`, which has at most 4: the time in seconds after the step of the command that
+/// begins the motion, ascending, and a pose as in `catenary_command_move_anchor`; for a particle a position, in m. A
+/// fifth point or a null translation makes the empty command. Other commands stay as they are.
+#[unsafe(no_mangle)]
+pub extern "C" fn catenary_command_with_point(
+    follow: Command,
+    time_s: f64,
+    translation: *const f32,
+    rotation: *const f32,
+) -> Command {
+    let Action::Follow { object, object_index, path, append } = follow.action() else {
+        return follow;
+    };
+    let point = |translation| PathPoint {
+        time: time_s,
+        translation,
+        rotation: numbers(rotation).unwrap_or(IDENTITY),
+    };
+    let points = |point| [path.points(), &[point]].concat();
+    let path = numbers(translation).map(point).and_then(|point| PathPart::new(&points(point)));
+    command(path.map(|path| Action::Follow { object, object_index, path, append }))
+}
+
+/// Appends the points of a `catenary_command_follow` to the motion that an earlier one began, and whose times go on. Other
+/// commands stay as they are.
+#[unsafe(no_mangle)]
+pub extern "C" fn catenary_command_appended(follow: Command) -> Command {
+    let Action::Follow { object, object_index, path, .. } = follow.action() else {
+        return follow;
+    };
+    command(Some(Action::Follow { object, object_index, path, append: true }))
 }
 
 /// Moves a body through the next step, with its mass and inertia. `translation` and `rotation` are as in

@@ -5,7 +5,10 @@
 use std::ptr::null;
 
 use catenary::*;
-use sim_contract::{Action, Command, KindFilter, ParameterValue, Text};
+use sim_contract::{
+    Action, Command, CommandOptions, KindFilter, MovedObject, ParameterValue, PathPart, PathPoint,
+    Text,
+};
 
 const A: [f32; 3] = [1.0, -2.0, 3.0];
 const B: [f32; 3] = [0.5, 0.25, 0.0];
@@ -33,8 +36,9 @@ const ZERO: [f32; 3] = [0.0; 3];
 fn each_function_makes_the_command_of_its_name() {
     let (a, b, c) = (A.as_ptr(), B.as_ptr(), C.as_ptr());
     let push = |limit| Action::Push { center: A, radius: 0.1, delta: B, limit };
-    let moved = |rotation| Action::MoveCollider { collider: 2, translation: A, rotation };
-    let anchor = |rotation| Action::MoveAnchor { anchor: 1, translation: A, rotation };
+    let moved =
+        |rotation| Action::MoveCollider { collider: 2, translation: A, rotation, over_s: 0.0 };
+    let anchor = |rotation| Action::MoveAnchor { anchor: 1, translation: A, rotation, over_s: 0.0 };
     let number = catenary_command_set(c"compliance".as_ptr(), 0.5);
     let for_kind = Action::Set {
         parameter: short("compliance"),
@@ -44,6 +48,21 @@ fn each_function_makes_the_command_of_its_name() {
         collider: None,
     };
     let bending = catenary_command_set(c"bending".as_ptr(), 0.5);
+    let point = |time, rotation| PathPoint { time, translation: A, rotation };
+    let follow = Action::Follow {
+        object: MovedObject::Collider,
+        object_index: 2,
+        path: PathPart::new(&[point(0.5, UNTURNED), point(1.0, QUARTER)]).unwrap(),
+        append: true,
+    };
+    let empty = catenary_command_follow(CommandOptions::COLLIDER, 2);
+    let straight = catenary_command_with_point(empty, 0.5, a, null());
+    let turned = catenary_command_with_point(straight, 1.0, a, QUARTER.as_ptr());
+    let full = (0..4).fold(empty, |command, time| {
+        catenary_command_with_point(command, f64::from(time), a, null())
+    });
+    assert_eq!(catenary_command_with_point(full, 4.0, a, null()), Command::default());
+    assert_eq!(catenary_command_follow(3, 2), Command::default());
     let friction = catenary_command_set(c"friction".as_ptr(), 0.5);
     let for_collider = Action::Set {
         parameter: short("friction"),
@@ -93,6 +112,15 @@ fn each_function_makes_the_command_of_its_name() {
         (catenary_command_for_block(bending, 3), for_block),
         (catenary_command_for_block(catenary_command_pin(7), 3), Action::Pin { particle: 7 }),
         (catenary_command_for_collider(friction, 2), for_collider),
+        (
+            catenary_command_with_over(catenary_command_move_collider(2, a, null()), 1.5),
+            Action::MoveCollider { collider: 2, translation: A, rotation: UNTURNED, over_s: 1.5 },
+        ),
+        (
+            catenary_command_with_over(catenary_command_move_anchor(1, a, null()), 1.5),
+            Action::MoveAnchor { anchor: 1, translation: A, rotation: UNTURNED, over_s: 1.5 },
+        ),
+        (catenary_command_appended(turned), follow),
         (catenary_command_for_collider(catenary_command_pin(7), 2), Action::Pin { particle: 7 }),
         (catenary_command_load(c"flag".as_ptr()), Action::Load { scene: short("flag") }),
         (

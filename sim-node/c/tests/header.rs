@@ -65,7 +65,7 @@ const TYPES: [(&str, &str); 40] = [
 /// Constants with their names in the header, their values, and their meanings.
 #[rustfmt::skip]
 #[allow(clippy::cast_possible_truncation, reason = "small limits")]
-const CONSTANTS: [(&str, &str, u32, &str); 29] = [
+const CONSTANTS: [(&str, &str, u32, &str); 31] = [
     ("CONTRACT_VERSION", "CATENARY_CONTRACT_VERSION", CONTRACT_VERSION, "version of the layouts of this header"),
     ("MEMBERS_MAX", "CATENARY_MEMBERS_MAX", MEMBERS_MAX as u32, "most members of the lockstep"),
     ("MEMBER_CHANGES_KEPT", "CATENARY_MEMBER_CHANGES_KEPT", MEMBER_CHANGES_KEPT as u32, "changes that a status names"),
@@ -94,7 +94,9 @@ const CONSTANTS: [(&str, &str, u32, &str); 29] = [
     ("CommandOptions::STATE", "CATENARY_OPTION_STATE", CommandOptions::STATE, "a restore has a complete state"),
     ("CommandOptions::MOTION", "CATENARY_OPTION_MOTION", CommandOptions::MOTION, "a restore has positions and velocities"),
     ("CommandOptions::BLOCK", "CATENARY_OPTION_BLOCK", CommandOptions::BLOCK, "a set is for one generated block"),
-    ("CommandOptions::COLLIDER", "CATENARY_OPTION_COLLIDER", CommandOptions::COLLIDER, "a set is for one collider"),
+    ("CommandOptions::COLLIDER", "CATENARY_OPTION_COLLIDER", CommandOptions::COLLIDER, "a set is for one collider; a follow moves a collider"),
+    ("CommandOptions::ANCHOR", "CATENARY_OPTION_ANCHOR", CommandOptions::ANCHOR, "a follow moves an anchor"),
+    ("CommandOptions::APPEND", "CATENARY_OPTION_APPEND", CommandOptions::APPEND, "a follow appends its points"),
 ];
 
 const INTRODUCTION: &str = "\

@@ -116,8 +116,9 @@ pub use scratch_domain::ScratchDomain;
 pub use sim_types::{
     Action, ActionFields, BlockValue, CLIENT_ID_END, COLLIDERS_MAX, COORDINATE_MAX, ColliderFields,
     ColliderShape, ConstraintKind, ELEMENTS_MAX, GRAB_OVER_S_DEFAULT, KindFilter, Method,
-    NumberRange, OffMeaning, PARAMETERS, Parameter, ParameterInfo, ParameterValue, ParameterValues,
-    ParticleFlags, PerKind, PlainF32, Reason, RestoreContents, SCENE_SIZE_BYTES_MAX,
-    SETTINGS_COUNT, STEP_WORK_MAX, Setting, TearCause, Text, TextError, ValueForm, allowed_indices,
-    json_hash, printable, printable_line,
+    MovedObject, NumberRange, OVER_S_MAX, OffMeaning, PARAMETERS, Parameter, ParameterInfo,
+    ParameterValue, ParameterValues, ParticleFlags, PathPart, PathPoint, PathRowError, PerKind,
+    PlainF32, Reason, RestoreContents, SCENE_SIZE_BYTES_MAX, SETTINGS_COUNT, STEP_WORK_MAX,
+    Setting, TearCause, Text, TextError, ValueForm, allowed_indices, json_hash, printable,
+    printable_line,
 };

@@ -154,7 +154,7 @@ def test_a_rejection_names_the_allowed_values(start_node: StartNode) -> None:
         (catenary.Action.set("dampness", 1), "gravity, damping, .*"),
         (catenary.Action.set("damping", float("nan")), "finite numbers"),
         (catenary.Action.set("damping", -1), "a number >= 0, or off for 0"),
-        (catenary.Action.grab(3, (0, 0, 0), 0.3), "coordinates within 1e7, .* over 0 to 0.25 s"),
+        (catenary.Action.grab(3, (0, 0, 0), 3601), "coordinates within 1e7, .* over 0 to 3600 s"),
     ]
     for action, allowed in rejected:
         message = rf"^rejected.*: .* \(allowed: {allowed}\): {{"

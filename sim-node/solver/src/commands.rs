@@ -2,19 +2,21 @@
 
 pub(crate) mod apply;
 pub(crate) mod cut;
+mod moves;
 pub(crate) mod plan;
 pub(crate) mod preparation;
 
 use glam::Vec3;
-use sim_types::{ConstraintKind, Parameter, ParameterValue, ParticleFlags, Reason};
+use sim_types::{ConstraintKind, MovedObject, Parameter, ParameterValue, ParticleFlags, Reason};
 
 use crate::checks::{check_finite, is_near};
 use crate::contacts::bodies::driven_body::BodyMotion;
 use crate::frame::{Frame, Pose};
 use crate::parameters::{Affected, Target};
 use crate::solver::Solver;
-use crate::step::drive::{ActiveGrab, GRAB_OVER_S_MAX};
+use crate::step::drive::{ActiveGrab, GRAB_HORIZON_S};
 use cut::Sphere;
+use moves::check_over;
 
 /// A request to drive a particle to a target.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,8 +25,8 @@ pub struct Grab {
     pub particle: u32,
     /// Target relative to the scene's origin. No coordinate exceeds [`crate::COORDINATE_MAX`].
     pub target: [f32; 3],
-    /// Time to reach the target in seconds, 0..=[`GRAB_OVER_S_MAX`], rounded up to whole steps, at
-    /// least one.
+    /// Time to reach the target in seconds, 0..=[`crate::OVER_S_MAX`], rounded up to whole steps, at least
+    /// one.
     pub over_s: f32,
 }
 
@@ -81,13 +83,13 @@ impl Solver {
     pub fn grab(&mut self, client_id: u64, grab: Grab) -> Result<(), Reason> {
         self.check_target(&grab)?;
         let index = self.find_unfrozen(grab.particle)?;
-        let steps_left = self.grab_steps(grab.over_s);
-        let Grab { particle, target, .. } = grab;
-        let active = ActiveGrab { particle, client_id, target, steps_left };
-        match self.find_grab(particle) {
-            Ok(place) if self.grabs[place].client_id != client_id => {
-                return Err(Reason::GrabbedByOther);
-            }
+        let particle = grab.particle;
+        let found = self.find_grab(particle);
+        if found.is_ok_and(|place| self.grabs[place].client_id != client_id) {
+            return Err(Reason::GrabbedByOther);
+        }
+        let active = self.active_grab(client_id, &grab)?;
+        match found {
             Ok(place) => self.grabs[place] = active,
             Err(place) => self.grabs.insert(place, active),
         }
@@ -105,9 +107,23 @@ impl Solver {
         self.check_target(&grab)?;
         self.find_unfrozen(grab.particle)?;
         let place = self.find_own_grab(client_id, grab.particle)?;
-        self.grabs[place].target = grab.target;
-        self.grabs[place].steps_left = self.grab_steps(grab.over_s);
+        self.grabs[place] = self.active_grab(client_id, &grab)?;
         Ok(())
+    }
+
+    /// The grab on its way to the target. A long way has a motion, with points between.
+    fn active_grab(&self, client_id: u64, grab: &Grab) -> Result<ActiveGrab, Reason> {
+        let Grab { particle, target, over_s } = *grab;
+        let steps = self.grab_steps(over_s);
+        let horizon = self.grab_steps(GRAB_HORIZON_S);
+        let motion = if steps > horizon {
+            let replaced = (MovedObject::Particle, particle);
+            let frame = |translation| Frame { translation, ..Frame::AT_LOAD };
+            Some(self.motion_to(replaced, frame(Vec3::from_array(target)), steps)?)
+        } else {
+            None
+        };
+        Ok(ActiveGrab { particle, client_id, target, steps_left: steps.min(horizon), motion })
     }
 
     /// Releases a grabbed particle with the velocity of its last step. A pinned particle stays in
@@ -173,29 +189,6 @@ impl Solver {
             }
         }
         Ok(())
-    }
-
-    /// Moves the frame of an anchor to a pose by the end of the next step, where it stays.
-    ///
-    /// # Errors
-    /// The anchor is unknown, or a number is not finite or out of range.
-    pub fn move_anchor(&mut self, anchor: u32, pose: Pose) -> Result<(), Reason> {
-        let frame = Frame::check(&pose, self.context())?;
-        let moved = self.anchors.moved.get_mut(anchor as usize);
-        *moved.ok_or(Reason::UnknownAnchor)? = Some(frame);
-        Ok(())
-    }
-
-    /// Moves a collider to a pose relative to its pose at load, by the end of the next step and with
-    /// the velocity that this implies. There it stays. It rotates about its own center; bounds do
-    /// not rotate.
-    ///
-    /// # Errors
-    /// The collider is unknown, or a number is not finite or out of range.
-    pub fn move_collider(&mut self, collider: u32, pose: Pose) -> Result<(), Reason> {
-        let frame = Frame::check(&pose, self.context())?;
-        let moved = self.colliders.get_mut(collider as usize);
-        moved.ok_or(Reason::UnknownCollider)?.move_to(frame)
     }
 
     /// Moves a body through the next step: from a pose, relative to that at load, and with the given motion. Particles
@@ -299,11 +292,9 @@ impl Solver {
 
     fn check_target(&self, grab: &Grab) -> Result<(), Reason> {
         check_finite(&grab.target)?;
-        check_finite(&[grab.over_s])?;
-        let is_near = is_near(&grab.target);
+        check_over(grab.over_s)?;
         let is_in_plane = !self.is_planar || grab.target[2] == 0.0;
-        let is_timely = (0.0..=GRAB_OVER_S_MAX).contains(&grab.over_s);
-        if is_near && is_in_plane && is_timely { Ok(()) } else { Err(Reason::OutOfRange) }
+        if is_near(&grab.target) && is_in_plane { Ok(()) } else { Err(Reason::OutOfRange) }
     }
 
     /// Position of a particle's grab in the list, or the position where it belongs. The list ascends by particle.

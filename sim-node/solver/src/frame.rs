@@ -50,11 +50,6 @@ impl Frame {
         Ok(Self::from_pose(pose))
     }
 
-    /// True if the rotation is a unit quaternion, up to rounding.
-    pub(crate) fn is_unit(&self) -> bool {
-        (self.rotation.dot(self.rotation) - 1.0).abs() < 1e-5
-    }
-
     /// The frame as a pose, for a keyframe.
     pub(crate) fn to_pose(self) -> Pose {
         Pose { translation: self.translation.to_array(), rotation: self.rotation.to_array() }

@@ -31,6 +31,7 @@ mod constraints;
 mod contacts;
 mod frame;
 mod kernels;
+mod motion;
 mod parameters;
 pub mod scene;
 mod solver;
@@ -50,9 +51,10 @@ pub use contacts::colliders::PlacedCollider;
 pub use frame::Pose;
 pub use kernels::Kernels;
 pub use kernels::worker_pool::THREADS_MAX;
+pub use motion::MOTION_POINTS_MAX;
 pub use scene::{ColliderGeometry, Scene, SceneError, SolverSettings};
 pub use sim_types::{
-    Action, BlockValue, COORDINATE_MAX, ConstraintKind, Method, PARAMETERS, Parameter,
+    Action, BlockValue, COORDINATE_MAX, ConstraintKind, Method, OVER_S_MAX, PARAMETERS, Parameter,
     ParameterValue, ParameterValues, ParticleFlags, Reason, TearCause,
 };
 pub use solver::Solver;
@@ -61,7 +63,6 @@ pub use state::forces::{ColliderImpulse, Forces, FrameImpulse, ParticleImpulse};
 pub use state::keyframe::{Keyframe, KeyframeError};
 pub use state::particles::Particle;
 pub use state::restore::RestoreError;
-pub use step::drive::GRAB_OVER_S_MAX;
 
 /// Version of the arithmetic. It changes whenever a step produces other bits. Only the version that
 /// made a recording can re-simulate it.

@@ -359,7 +359,7 @@ impl Solver {
         }
     }
 
-    /// Number of steps that a grab of `over_s` seconds takes, rounded up, at least one. A time that
+    /// Number of steps that a motion of `over_s` seconds takes, rounded up, at least one. A time that
     /// differs from whole steps only by its rounding to f32 counts as those: 1/60 s at 240 Hz is 4
     /// steps, not 5.
     pub(crate) fn grab_steps(&self, over_s: f32) -> u32 {
@@ -367,7 +367,7 @@ impl Solver {
         #[allow(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
-            reason = "0 <= over_s <= 0.25 and rate <= 1e5: at most 25,000"
+            reason = "0 <= over_s <= 3600 and rate <= 1e5: at most 3.6e8"
         )]
         let steps = steps.ceil() as u32;
         steps.max(1)

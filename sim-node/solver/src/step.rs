@@ -17,7 +17,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use glam::Vec3;
 use sim_types::ParticleFlags;
 
-use drive::{count_step, drive_grabbed};
+use drive::{GRAB_HORIZON_S, GRAB_HORIZON_SUBSTEPS, begin_grabs, count_step, drive_grabbed};
 use prediction::Prediction;
 use stage::Stage;
 use substep::{Substep, SubstepInputs};
@@ -153,10 +153,13 @@ impl Solver {
         }
         self.scene_step += 1;
         let (time_s, dt) = (self.scene_time_s(), self.step_length());
-        self.anchors.begin_step(time_s);
+        self.anchors.begin_step(self.scene_step, time_s);
         for collider in &mut self.colliders {
-            collider.begin_step(time_s, dt);
+            collider.begin_step(self.scene_step, time_s, dt);
         }
+        let steps = (GRAB_HORIZON_SUBSTEPS / self.parameters.substeps).max(1);
+        let horizon = self.grab_steps(GRAB_HORIZON_S).min(steps);
+        begin_grabs(&mut self.grabs, self.scene_step, horizon);
     }
 
     /// [`Stage::Drive`]. A grab overrides an anchor. Moving roots of tethers are updated.

@@ -132,7 +132,7 @@ fn a_rejected_command_changes_no_bit_of_the_future() {
     solver.grab(CLIENT, grab(90, [0.1, 0.2, 0.3])).unwrap();
     step(&mut solver, 3);
     let mut untouched = solver.clone();
-    let long = Grab { over_s: 0.26, ..grab(9, [0.0; 3]) };
+    let long = Grab { over_s: 3601.0, ..grab(9, [0.0; 3]) };
     let backwards = Grab { over_s: -0.1, ..long };
     let timeless = Grab { over_s: f32::NAN, ..long };
     let rejected = [

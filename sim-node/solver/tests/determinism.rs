@@ -4,8 +4,8 @@
 
 use proptest::prelude::*;
 use sim_solver::{
-    Grab, Keyframe, ParameterValue, Particle, ParticleFlags, Pose, Push, RestoreError, Scene,
-    Solver, Sphere, Sweep, builtin,
+    Grab, Keyframe, MOTION_POINTS_MAX, ParameterValue, Particle, ParticleFlags, Pose, Push,
+    RestoreError, Scene, Solver, Sphere, Sweep, builtin,
 };
 
 #[derive(Debug, Clone)]
@@ -27,7 +27,7 @@ enum RandomCommand {
 }
 
 /// Parameters with a number. Each has the range to which 0 to 1 is mapped.
-const SETTINGS: [(&str, f32, f32); 10] = [
+const SETTINGS: [(&str, f32, f32); 12] = [
     ("damping", 0.0, 5.0),
     ("wind_drag", 0.0, 2.0),
     ("relaxation", 0.5, 1.5),
@@ -38,6 +38,8 @@ const SETTINGS: [(&str, f32, f32); 10] = [
     ("compliance", 0.0, 1e-3),
     ("stiffness", 0.1, 1.0),
     ("bending", 0.0, 0.1),
+    ("friction", 0.0, 2.0),
+    ("restitution", -0.5, 1.0),
 ];
 
 fn random_command() -> impl Strategy<Value = RandomCommand> {
@@ -65,7 +67,9 @@ fn random_command() -> impl Strategy<Value = RandomCommand> {
 
 /// Applies a command. A rejection is a valid outcome, too.
 fn apply(solver: &mut Solver, command: &RandomCommand) {
-    let grab = |particle, target| Grab { particle, target, over_s: 0.05 };
+    // Long and short motions.
+    let over_s = |[x, ..]: [f32; 3]| 0.6 * x.abs();
+    let grab = |particle, target| Grab { particle, target, over_s: over_s(target) };
     let _outcome = match *command {
         RandomCommand::Pin(particle) => solver.pin(particle),
         RandomCommand::Unpin(particle) => solver.unpin(particle),
@@ -83,10 +87,12 @@ fn apply(solver: &mut Solver, command: &RandomCommand) {
             solver.cut_segment(Sweep { from, to, direction: [0.0, 0.0, 1.0] })
         }
         RandomCommand::MoveAnchor(translation) => {
-            solver.move_anchor(0, Pose { translation, rotation: [0.1, 0.0, 0.2, 1.0] })
+            let pose = Pose { translation, rotation: [0.1, 0.0, 0.2, 1.0] };
+            solver.move_anchor_over(0, pose, over_s(translation))
         }
         RandomCommand::MoveCollider(collider, translation) => {
-            solver.move_collider(collider, Pose { translation, rotation: [0.0, 0.0, 0.0, 1.0] })
+            let pose = Pose { translation, rotation: [0.0, 0.0, 0.0, 1.0] };
+            solver.move_collider_over(collider, pose, over_s(translation))
         }
         RandomCommand::Set(which, share) => {
             let (name, low, high) = SETTINGS[which];
@@ -378,8 +384,8 @@ fn damaged_keyframes_are_refused() {
     }
 }
 
-/// Every particle is pinned and grabbed, and every constraint is torn, in a scene with tethers and in
-/// one without.
+/// Every particle is pinned and grabbed, one of them on a path of as many points as there can be, and every constraint
+/// is torn, in a scene with tethers and in one without.
 #[test]
 fn the_largest_keyframe_of_a_scene_fits_into_the_announced_size() {
     for name in ["curtain", "tearable-cloth"] {
@@ -396,6 +402,17 @@ fn the_largest_keyframe_of_a_scene_fits_into_the_announced_size() {
         }
         for constraint in 0..u32::try_from(solver.constraint_count()).unwrap() {
             apply(&mut solver, &sim_types::Action::Cut { constraint });
+        }
+        solver.release_of_any(0).unwrap();
+        solver.grab(7, Grab { particle: 0, target: [0.5, 0.5, 0.0], over_s: 0.1 }).unwrap();
+        let point = |index| sim_types::PathPoint {
+            time: f64::from(index) * 0.1,
+            ..sim_types::PathPoint::AT_LOAD
+        };
+        let points: Vec<_> = (1..u32::try_from(MOTION_POINTS_MAX).unwrap()).map(point).collect();
+        let particle = sim_types::MovedObject::Particle;
+        for action in sim_types::Action::follow(particle, 0, &points, false) {
+            solver.apply(7, &action).unwrap();
         }
         solver.finish_boundary();
         solver.step();

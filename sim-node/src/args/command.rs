@@ -1,11 +1,11 @@
 //! Command lines of the commands of `ctl`: each one is applied by the node and has an outcome.
 
+use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::builder::{NonEmptyStringValueParser, PossibleValuesParser, TypedValueParser};
 use clap::{ArgAction, Args as ClapArgs, Subcommand};
-use sim_contract::{ConstraintKind, GRAB_OVER_S_DEFAULT, ParameterValue};
-use sim_solver::GRAB_OVER_S_MAX;
+use sim_contract::{ConstraintKind, GRAB_OVER_S_DEFAULT, MovedObject, OVER_S_MAX, ParameterValue};
 
 use super::parameter::{parameter_name, parameters_help};
 use super::value::{index, number, seconds_up_to, time, whole};
@@ -60,7 +60,9 @@ pub(crate) enum CommandVerb {
     /// Move an anchor to a pose and end its path
     #[command(
         allow_negative_numbers = true,
-        after_help = "Example: sim-node ctl move-anchor 0 0.2 0 -0.1"
+        after_help = "Examples:\n  \
+            sim-node ctl move-anchor 0 0.2 0 -0.1\n  \
+            sim-node ctl move-anchor 0 0.2 0 -0.1 --over 5s"
     )]
     MoveAnchor {
         /// Index of the anchor
@@ -68,14 +70,17 @@ pub(crate) enum CommandVerb {
         anchor: u32,
         #[command(flatten)]
         pose: PoseArgs,
+        #[command(flatten)]
+        over: OverArgs,
     },
-    /// Move a collider to a pose by the end of the next step
+    /// Move a collider to a pose
     ///
-    /// The whole way is made within this one step, with the speed that this implies. For a slow motion, send a pose for
-    /// each part of the way.
+    /// Without --over, the whole way is made within one step, with the speed that this implies.
     #[command(
         allow_negative_numbers = true,
-        after_help = "Example: sim-node ctl move-collider 0 0 0.1 -0.2 --rotation 0 0.6 0 0.8"
+        after_help = "Examples:\n  \
+            sim-node ctl move-collider 0 0 0.1 -0.2 --rotation 0 0.6 0 0.8\n  \
+            sim-node ctl move-collider 0 0 0.1 -0.2 --over 5s"
     )]
     MoveCollider {
         /// Index of the collider
@@ -83,7 +88,19 @@ pub(crate) enum CommandVerb {
         collider: u32,
         #[command(flatten)]
         pose: PoseArgs,
+        #[command(flatten)]
+        over: OverArgs,
     },
+    /// Lead a grabbed particle, an anchor or a collider along points in time
+    ///
+    /// The file has a point on each line: the time in s after this command, x, y and z, and where it rotates the
+    /// quaternion x, y, z, w, separated by commas or spaces. Times ascend. A line that begins with # is a comment. A point
+    /// is in m: of a particle relative to the origin of the scene, else relative to the pose at load. The object
+    /// moves linearly from where it is, and stays at the last point. At most 2048 points are on their way.
+    #[command(after_help = "Examples:\n  \
+        sim-node ctl follow collider 0 --path wave.csv\n  \
+        sim-node ctl follow particle 90 --path arc.csv")]
+    Follow(FollowArgs),
     /// Move a body of another program through the next step
     DriveBody(DriveBodyArgs),
     /// Set a parameter of the simulation
@@ -171,10 +188,10 @@ pub(crate) struct TargetArgs {
     pub(crate) particle: u32,
     #[command(flatten)]
     pub(crate) target: PointArgs,
-    /// Time to the target in seconds, such as 0.1, or with its unit, such as 100ms: at most 0.25 s, rounded up to whole
+    /// Time to the target in seconds, such as 0.1, or with its unit, such as 100ms: at most an hour, rounded up to whole
     /// steps [default: 1/60 s]
     #[arg(long, value_name = "TIME", default_value_t = GRAB_OVER_S_DEFAULT,
-        hide_default_value = true, value_parser = seconds_up_to(GRAB_OVER_S_MAX))]
+        hide_default_value = true, value_parser = seconds_up_to(OVER_S_MAX))]
     pub(crate) over: f32,
 }
 
@@ -276,6 +293,45 @@ pub(crate) struct PoseArgs {
     #[arg(long, num_args = 4, action = ArgAction::Set, default_values = ["0", "0", "0", "1"],
         value_names = ["QX", "QY", "QZ", "QW"], value_parser = number)]
     pub(crate) rotation: Vec<f32>,
+}
+
+/// The time of a motion.
+#[derive(Debug, Clone, Copy, ClapArgs)]
+pub(crate) struct OverArgs {
+    /// Time to the pose in seconds, such as 0.1, or with its unit, such as 100ms: at most an hour, rounded up to whole
+    /// steps [default: one step]
+    #[arg(long, value_name = "TIME", default_value_t = 0.0, hide_default_value = true,
+        value_parser = seconds_up_to(OVER_S_MAX))]
+    pub(crate) over: f32,
+}
+
+#[derive(Debug, ClapArgs)]
+pub(crate) struct FollowArgs {
+    /// Kind of the object
+    #[arg(value_parser = moved_object())]
+    pub(crate) object: MovedObject,
+    /// Index of the particle, anchor or collider
+    #[arg(value_parser = index)]
+    pub(crate) index: u32,
+    /// File with the points
+    #[arg(long, value_name = "FILE")]
+    pub(crate) path: PathBuf,
+    /// Append the points to the motion under way, whose times go on
+    #[arg(long)]
+    pub(crate) append: bool,
+}
+
+/// Parser of the name of an object.
+fn moved_object() -> impl TypedValueParser<Value = MovedObject> {
+    const ALL: [(&str, MovedObject); 3] = [
+        ("particle", MovedObject::Particle),
+        ("anchor", MovedObject::Anchor),
+        ("collider", MovedObject::Collider),
+    ];
+    PossibleValuesParser::new(ALL.map(|(name, _)| name)).try_map(|name| {
+        let named = ALL.into_iter().find(|(one, _)| *one == name);
+        named.map(|(_, object)| object).ok_or("there is no such object")
+    })
 }
 
 #[derive(Debug, ClapArgs)]

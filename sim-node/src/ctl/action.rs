@@ -1,21 +1,23 @@
 //! The action of each command of `ctl`.
 
-use std::path;
+use std::fs;
+use std::path::{self, Path};
 use std::time::Duration;
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 use sim_contract::clock::SECOND_NS;
-use sim_contract::{Action, KindFilter, Text};
+use sim_contract::{Action, KindFilter, OVER_S_MAX, PathPoint, Text};
+use sim_solver::MOTION_POINTS_MAX;
 
-use crate::args::{CommandVerb, PoseArgs, RewindArgs, SetArgs};
+use crate::args::{CommandVerb, FollowArgs, PoseArgs, RewindArgs, SetArgs};
 use crate::scene_source;
 
 /// Action of a command. `rate_hz` returns the rate of the node.
 pub(super) fn from_verb(
     verb: &CommandVerb,
     rate_hz: impl FnOnce() -> anyhow::Result<u32>,
-) -> anyhow::Result<Action> {
-    Ok(match verb {
+) -> anyhow::Result<Vec<Action>> {
+    Ok(vec![match verb {
         CommandVerb::Pin { particle } => Action::Pin { particle: *particle },
         CommandVerb::Unpin { particle } => Action::Unpin { particle: *particle },
         CommandVerb::Grab(args) => Action::Grab {
@@ -46,13 +48,13 @@ pub(super) fn from_verb(
             to: numbers(&args.to)?,
             direction: numbers(&args.direction)?,
         },
-        CommandVerb::MoveAnchor { anchor, pose } => {
+        CommandVerb::MoveAnchor { anchor, pose, over } => {
             let (translation, rotation) = translation_and_rotation(pose)?;
-            Action::MoveAnchor { anchor: *anchor, translation, rotation }
+            Action::MoveAnchor { anchor: *anchor, translation, rotation, over_s: over.over }
         }
-        CommandVerb::MoveCollider { collider, pose } => {
+        CommandVerb::MoveCollider { collider, pose, over } => {
             let (translation, rotation) = translation_and_rotation(pose)?;
-            Action::MoveCollider { collider: *collider, translation, rotation }
+            Action::MoveCollider { collider: *collider, translation, rotation, over_s: over.over }
         }
         CommandVerb::DriveBody(args) => {
             let (translation, rotation) = translation_and_rotation(&args.pose)?;
@@ -80,7 +82,47 @@ pub(super) fn from_verb(
                 None => None,
             },
         },
-    })
+        CommandVerb::Follow(FollowArgs { object, index, path, append }) => {
+            return Ok(Action::follow(*object, *index, &points(path)?, *append));
+        }
+    }])
+}
+
+/// Reads the points of a path, one on each line. Checks them first, because a path of several commands should not begin if
+/// one of them is wrong.
+fn points(path: &Path) -> anyhow::Result<Vec<PathPoint>> {
+    let text = fs::read_to_string(path).with_context(|| format!("{}", path.display()))?;
+    let mut points: Vec<PathPoint> = Vec::new();
+    for (line, text) in (1..).zip(text.lines().map(str::trim)) {
+        if text.is_empty() || text.starts_with('#') {
+            continue;
+        }
+        let place = || format!("{}:{line}", path.display());
+        let words = text.split([',', ' ', '\t']).filter(|word| !word.is_empty());
+        let row = words.map(|word| {
+            let number = word.parse::<f64>().ok().filter(|number| number.is_finite());
+            number.with_context(|| format!("'{word}' is not a number"))
+        });
+        let row = row.collect::<anyhow::Result<Vec<_>>>().with_context(place)?;
+        let point = PathPoint::from_row(&row).with_context(place)?;
+        if let Some(before) = points.last().filter(|before| before.time >= point.time) {
+            let problem = format!("{} is not after {}", point.time, before.time);
+            bail!("{}: time: {problem} (allowed: ascending times)", place());
+        }
+        if !(0.0..=f64::from(OVER_S_MAX)).contains(&point.time) {
+            bail!(
+                "{}: time: {} is out of range (allowed: 0 to {OVER_S_MAX} s)",
+                place(),
+                point.time
+            );
+        }
+        points.push(point);
+    }
+    if points.is_empty() || points.len() > MOTION_POINTS_MAX {
+        let count = points.len();
+        bail!("{}: has {count} points (allowed: 1 to {MOTION_POINTS_MAX})", path.display());
+    }
+    Ok(points)
 }
 
 /// Number of steps in a simulated time, rounded up.
@@ -138,7 +180,9 @@ mod tests {
         let args = try_parse(words).unwrap_or_else(|error| panic!("{line}: {error}"));
         let Some(Verb::Ctl(ctl)) = args.verb else { panic!("{line}: not ctl") };
         let CtlVerb::Command(verb) = ctl.verb else { panic!("{line}: not a command") };
-        from_verb(&verb, || Ok(240)).unwrap()
+        let actions = from_verb(&verb, || Ok(240)).unwrap();
+        let [action] = actions[..] else { panic!("{line}: {actions:?}") };
+        action
     }
 
     fn set(name: &str, value: ParameterValue, kind: Option<ConstraintKind>) -> Action {
@@ -172,12 +216,19 @@ mod tests {
     #[test]
     fn a_pose_is_a_translation_with_an_optional_rotation() {
         let translation = [0.0, 0.1, -0.2];
-        let expected =
-            Action::MoveAnchor { anchor: 3, translation, rotation: [0.0, 0.0, 0.0, 1.0] };
+        let expected = Action::MoveAnchor {
+            anchor: 3,
+            translation,
+            rotation: [0.0, 0.0, 0.0, 1.0],
+            over_s: 0.0,
+        };
         assert_eq!(action("move-anchor 3 0 0.1 -0.2"), expected);
         let rotation = [0.0, -0.6, 0.0, 0.8];
-        let expected = Action::MoveCollider { collider: 2, translation, rotation };
+        let expected = Action::MoveCollider { collider: 2, translation, rotation, over_s: 0.0 };
         assert_eq!(action("move-collider 2 0 0.1 -0.2 --rotation 0 -0.6 0 0.8"), expected);
+        let expected = Action::MoveCollider { collider: 2, translation, rotation, over_s: 1800.0 };
+        let line = "move-collider 2 0 0.1 -0.2 --rotation 0 -0.6 0 0.8 --over 30min";
+        assert_eq!(action(line), expected);
         let body = |angular_velocity, force| Action::DriveBody {
             collider: 2,
             translation,
@@ -191,6 +242,31 @@ mod tests {
         assert_eq!(action(line), body([0.0; 3], [0.0; 3]));
         let line = format!("{line} --angular-velocity 1 -2 3 --force 4 5 -6 --torque 4 5 -6");
         assert_eq!(action(&line), body([1.0, -2.0, 3.0], [4.0, 5.0, -6.0]));
+    }
+
+    #[test]
+    fn a_path_is_read_from_lines_and_a_wrong_one_names_its_line() {
+        let file = std::env::temp_dir().join(format!("catenary-path-{}.csv", std::process::id()));
+        let read = |text: &str| {
+            fs::write(&file, text).unwrap();
+            points(&file)
+        };
+        let read_points = read("# time x y z\n0, 1, 2, 3\n\n0.5 1 2 3 0 0 0.6 0.8\n").unwrap();
+        let first = PathPoint { translation: [1.0, 2.0, 3.0], ..PathPoint::AT_LOAD };
+        let second = PathPoint { time: 0.5, rotation: [0.0, 0.0, 0.6, 0.8], ..first };
+        assert_eq!(read_points, [first, second]);
+        for (text, expected) in [
+            ("0 1 2 3\n0 1 2 3", "csv:2: time: 0 is not after 0 (allowed: ascending times)"),
+            ("1 1 2", "csv:1: a point of 3 numbers (allowed: 4, its time in s and x, y, z; or 8,"),
+            ("1 1 2 x", "csv:1: 'x' is not a number"),
+            ("1 1 2 nan", "csv:1: 'nan' is not a number"),
+            ("3601 1 2 3", "csv:1: time: 3601 is out of range (allowed: 0 to 3600 s)"),
+            ("# nothing", "csv: has 0 points (allowed: 1 to 2048)"),
+        ] {
+            let error = format!("{:#}", read(text).unwrap_err());
+            assert!(error.contains(expected), "{error}");
+        }
+        fs::remove_file(&file).unwrap();
     }
 
     #[test]

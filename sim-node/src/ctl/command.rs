@@ -2,10 +2,10 @@
 
 use std::time::Duration;
 
-use anyhow::bail;
+use anyhow::{Context, bail};
 use serde::Serialize;
 use sim_contract::clock::monotonic_ns;
-use sim_contract::{Action, Client, Outcome};
+use sim_contract::{Action, COMMANDS_BUFFERED, Client, Outcome};
 
 use super::{hint, rejection};
 use crate::args::CtlArgs;
@@ -31,10 +31,15 @@ fn is_false(value: &bool) -> bool {
     !value
 }
 
-/// Sends a command and prints its outcome. Waits for the last step of `step`.
-pub(super) fn send(client: &mut Client, args: &CtlArgs, action: Action) -> anyhow::Result<Exit> {
-    let outcome = client.request(action, args.timeout())?;
-    if let Action::Step { count } = action
+/// Sends the commands of a verb, up to the first one that is rejected, and prints the outcome of the last one that was
+/// sent. Waits for the last step of `step`.
+pub(super) fn send(
+    client: &mut Client,
+    args: &CtlArgs,
+    actions: &[Action],
+) -> anyhow::Result<Exit> {
+    let outcome = request_all(client, args, actions)?;
+    if let Action::Step { count } = outcome.command.action()
         && outcome.is_applied()
     {
         wait_for_steps(client, args, &outcome, count)?;
@@ -75,6 +80,26 @@ pub(super) fn send(client: &mut Client, args: &CtlArgs, action: Action) -> anyho
         output::note(&format!("hint: {hint}"));
     }
     Ok(Exit::Done)
+}
+
+/// Sends commands, several at a time, because the outcome of each takes a step. Returns the first outcome that is a
+/// rejection, or the last one.
+fn request_all(client: &mut Client, args: &CtlArgs, actions: &[Action]) -> anyhow::Result<Outcome> {
+    let mut last = None;
+    for actions in actions.chunks(COMMANDS_BUFFERED / 2) {
+        let mut sent = Vec::with_capacity(actions.len());
+        for action in actions {
+            sent.push(client.send(*action)?);
+        }
+        for sequence in sent {
+            let outcome = client.outcome(sequence, args.timeout())?;
+            if !outcome.is_applied() {
+                return Ok(outcome);
+            }
+            last = Some(outcome);
+        }
+    }
+    last.context("there is nothing to send")
 }
 
 /// Time between two checks whether a replay has ended.

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use crate::json::hash;
 use crate::json::non_finite::{number, optional_number, rotation, vector};
 use crate::parameter::ParameterValue;
+use crate::path_part::{PathPart, PathPoint};
 use crate::text::Text;
 
 pub use fields::ActionFields;
@@ -17,6 +18,9 @@ use kind_filter::kind_or_all;
 
 /// Default time in which a grabbed particle reaches its target, in seconds: one frame at 60 Hz.
 pub const GRAB_OVER_S_DEFAULT: f32 = 1.0 / 60.0;
+
+/// Longest time of a motion, in seconds.
+pub const OVER_S_MAX: f32 = 3600.0;
 
 /// An action at the boundary before a step. Its JSON form is a flat object with "kind".
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -39,7 +43,7 @@ pub enum Action {
         /// Target in m, relative to the scene's origin.
         #[serde(with = "vector")]
         target: [f32; 3],
-        /// Time to the target in seconds, 0..=0.25, rounded up to whole steps.
+        /// Time to the target in seconds, 0..=3600, rounded up to whole steps.
         #[serde(with = "number", default = "grab_over_s_default")]
         over_s: f32,
     },
@@ -50,7 +54,7 @@ pub enum Action {
         /// Target in m, relative to the scene's origin.
         #[serde(with = "vector")]
         target: [f32; 3],
-        /// Time to the target in seconds, 0..=0.25, rounded up to whole steps.
+        /// Time to the target in seconds, 0..=3600, rounded up to whole steps.
         #[serde(with = "number", default = "grab_over_s_default")]
         over_s: f32,
     },
@@ -115,7 +119,7 @@ pub enum Action {
         #[serde(with = "vector")]
         direction: [f32; 3],
     },
-    /// Replaces an anchor's path. The anchor reaches this pose at the end of the next step and stays.
+    /// Replaces an anchor's path. The anchor reaches this pose within `over_s` and stays.
     MoveAnchor {
         /// Index of the anchor.
         anchor: u32,
@@ -125,8 +129,11 @@ pub enum Action {
         /// Rotation relative to the pose at load, as the quaternion x, y, z, w.
         #[serde(default = "identity", with = "rotation")]
         rotation: [f32; 4],
+        /// Time to the pose in seconds, 0..=3600, rounded up to whole steps, at least one.
+        #[serde(default, with = "number", skip_serializing_if = "is_zero")]
+        over_s: f32,
     },
-    /// Moves a collider to a pose during the next step, with the velocity that the motion implies.
+    /// Moves a collider to a pose within `over_s`, with the velocity that the motion implies.
     MoveCollider {
         /// Index of the collider.
         collider: u32,
@@ -136,6 +143,9 @@ pub enum Action {
         /// Rotation relative to the pose at load, as the quaternion x, y, z, w.
         #[serde(default = "identity", with = "rotation")]
         rotation: [f32; 4],
+        /// Time to the pose in seconds, 0..=3600, rounded up to whole steps, at least one.
+        #[serde(default, with = "number", skip_serializing_if = "is_zero")]
+        over_s: f32,
     },
     /// Sets a parameter of the simulation.
     Set {
@@ -211,6 +221,19 @@ pub enum Action {
         #[serde(default, with = "vector")]
         torque: [f32; 3],
     },
+    /// Leads a particle that this client has grabbed, an anchor or a collider along points in time. It moves linearly
+    /// between them, and stays at the last one.
+    Follow {
+        /// Kind of the object.
+        object: MovedObject,
+        /// Index of the particle, anchor or collider.
+        object_index: u32,
+        /// The points. Their times ascend.
+        path: PathPart,
+        /// Appends the points to the motion that an earlier command began, and whose times go on.
+        #[serde(default, skip_serializing_if = "is_false")]
+        append: bool,
+    },
     /// A kind that this version does not know. Always rejected.
     Unknown {
         /// Number of the kind on the wire. The number of a known kind becomes `u32::MAX` there, which
@@ -244,6 +267,7 @@ impl Action {
             Self::Restore { .. } => "restore",
             Self::Mark { .. } => "mark",
             Self::DriveBody { .. } => "drive_body",
+            Self::Follow { .. } => "follow",
             Self::Unknown { .. } => "unknown",
         }
     }
@@ -258,9 +282,26 @@ fn is_false(value: &bool) -> bool {
     !value
 }
 
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn is_zero(value: &f32) -> bool {
+    value.to_bits() == 0
+}
+
 /// No rotation.
 fn identity() -> [f32; 4] {
     [0.0, 0.0, 0.0, 1.0]
+}
+
+/// Object that an [`Action::Follow`] moves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MovedObject {
+    /// A particle that the client has grabbed.
+    Particle,
+    /// An anchor.
+    Anchor,
+    /// A collider.
+    Collider,
 }
 
 /// Part of a state that a restore puts in place.
@@ -282,6 +323,24 @@ impl RestoreContents {
 }
 
 impl Action {
+    /// The commands that lead an object along points: the first one begins the motion, unless it is to be appended, and
+    /// the others append to it.
+    pub fn follow(
+        object: MovedObject,
+        object_index: u32,
+        points: &[PathPoint],
+        append: bool,
+    ) -> Vec<Self> {
+        let parts = points.chunks(PathPart::POINTS_MAX).filter_map(PathPart::new).enumerate();
+        let part = |(index, path)| Self::Follow {
+            object,
+            object_index,
+            path,
+            append: append || index > 0,
+        };
+        parts.map(part).collect()
+    }
+
     /// Samples for tests of formats: one action of each kind, or several if it has options.
     #[doc(hidden)]
     pub fn samples() -> Vec<Self> {
@@ -314,8 +373,13 @@ impl Action {
             Self::Cut { constraint: 6 },
             Self::CutRadius { center: target, radius: 0.25 },
             Self::CutSegment { from: target, to: delta, direction: [0.0, 0.0, 1.0] },
-            Self::MoveAnchor { anchor: 1, translation: target, rotation },
-            Self::MoveCollider { collider: 2, translation: target, rotation: identity() },
+            Self::MoveAnchor { anchor: 1, translation: target, rotation, over_s: 0.0 },
+            Self::MoveCollider {
+                collider: 2,
+                translation: target,
+                rotation: identity(),
+                over_s: 1.5,
+            },
             set("damping", ParameterValue::Number(0.5), None),
             set("gravity", ParameterValue::Vector(target), None),
             set("tear_force", ParameterValue::Off, None),
@@ -349,6 +413,16 @@ impl Action {
                 angular_velocity: delta,
                 force: [0.5, 0.0, 0.0],
                 torque: [0.0, 0.0, -0.125],
+            },
+            Self::Follow {
+                object: MovedObject::Collider,
+                object_index: 2,
+                path: PathPart::new(&[
+                    PathPoint { time: 0.1, translation: target, rotation },
+                    PathPoint { time: 3600.0, ..PathPoint::AT_LOAD },
+                ])
+                .unwrap_or(PathPart::EMPTY),
+                append: true,
             },
             Self::Unknown { number: 99 },
         ]

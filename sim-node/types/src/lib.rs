@@ -9,7 +9,7 @@
 //! assert_eq!(action, Action::Pin { particle: 3 });
 //! let damping = Parameter::from_name("damping").map(Parameter::info);
 //! assert_eq!(damping.map(|info| info.unit), Some("1/s"));
-//! assert_eq!(PARAMETERS.len(), 18);
+//! assert_eq!(PARAMETERS.len(), 20);
 //! # Ok::<(), serde_json::Error>(())
 //! ```
 //!
@@ -25,13 +25,16 @@ mod method;
 mod parameter;
 mod parameter_values;
 mod particle_flags;
+mod path_part;
 mod range;
 mod reason;
 mod suggestion;
 mod tear_cause;
 mod text;
 
-pub use action::{Action, ActionFields, GRAB_OVER_S_DEFAULT, KindFilter, RestoreContents};
+pub use action::{
+    Action, ActionFields, GRAB_OVER_S_DEFAULT, KindFilter, MovedObject, OVER_S_MAX, RestoreContents,
+};
 pub use collider_shape::{ColliderFields, ColliderShape};
 pub use constraint_kind::ConstraintKind;
 pub use json::hash as json_hash;
@@ -41,6 +44,7 @@ pub use method::Method;
 pub use parameter::{OffMeaning, PARAMETERS, Parameter, ParameterInfo, ParameterValue, ValueForm};
 pub use parameter_values::{BlockValue, ParameterValues, PerKind, SETTINGS_COUNT, Setting};
 pub use particle_flags::ParticleFlags;
+pub use path_part::{PathPart, PathPoint, PathRowError};
 pub use range::{COORDINATE_MAX, NumberRange, allowed_indices};
 pub use reason::Reason;
 pub use suggestion::{did_you_mean, nearest};

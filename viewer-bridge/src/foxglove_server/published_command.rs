@@ -32,11 +32,11 @@ pub fn parse(payload: &[u8], epoch: u32) -> Result<Command, String> {
         }
         Action::CutRadius { center, radius } => Command::CutRadius { center, radius },
         Action::CutSegment { from, to, direction } => Command::CutSegment { from, to, direction },
-        Action::MoveAnchor { anchor, translation, rotation } => {
-            Command::MoveAnchor { anchor, translation, rotation }
+        Action::MoveAnchor { anchor, translation, rotation, over_s } => {
+            Command::MoveAnchor { anchor, translation, rotation, over_s }
         }
-        Action::MoveCollider { collider, translation, rotation } => {
-            Command::MoveCollider { collider, translation, rotation }
+        Action::MoveCollider { collider, translation, rotation, over_s } => {
+            Command::MoveCollider { collider, translation, rotation, over_s }
         }
         Action::Set { parameter, value, constraint_kind, block, collider } => {
             let parameter = parameter.as_str().to_owned();
@@ -67,6 +67,7 @@ pub fn parse(payload: &[u8], epoch: u32) -> Result<Command, String> {
             force,
             torque,
         }),
+        Action::Follow { .. } => return Err("follow is not accepted here".to_owned()),
         Action::Restore { .. } => return Err("restore is not accepted here".to_owned()),
         Action::Unknown { .. } => return Err("no such command".to_owned()),
     })

@@ -1,7 +1,6 @@
 //! Range checks of the numbers in a command, before it reaches the source.
 
-use sim_contract::{COORDINATE_MAX, ParameterValue, Reason, Text};
-use sim_solver::GRAB_OVER_S_MAX;
+use sim_contract::{COORDINATE_MAX, OVER_S_MAX, ParameterValue, Reason, Text};
 
 use super::body_drive::BodyDrive;
 use super::from_page::Command;
@@ -9,6 +8,8 @@ use crate::limits::{CONSTRAINTS_PER_CUT_MAX, STEPS_AT_ONCE_MAX};
 
 /// Shortest time of a brush stroke, in s.
 const BRUSH_OVER_S_MIN: f32 = 1e-3;
+/// Longest time of a brush stroke, or between two poses of a carried object, in s.
+const FRAME_OVER_S_MAX: f32 = 0.25;
 /// Range of `rate`.
 const RATES: std::ops::RangeInclusive<f32> = 0.1..=10.0;
 
@@ -20,18 +21,18 @@ pub fn check(command: &Command) -> Result<(), Reason> {
     match command {
         Command::Grab { target, over_s, .. } | Command::Move { target, over_s, .. } => {
             points(&[*target])?;
-            within(*over_s, 0.0, GRAB_OVER_S_MAX)
+            within(*over_s, 0.0, OVER_S_MAX)
         }
         Command::Carry { offset, over_s, .. } => {
             points(&[*offset])?;
-            within(*over_s, 0.0, GRAB_OVER_S_MAX)
+            within(*over_s, 0.0, FRAME_OVER_S_MAX)
         }
         Command::Throw { velocity, .. } => points(&[*velocity]),
         Command::Brush { eye, ray, radius, delta, over_s, cap, stroke: _ } => {
             points(&[*eye, *ray, *delta])?;
             direction(ray)?;
             within(*radius, 0.0, COORDINATE_MAX)?;
-            within(*over_s, BRUSH_OVER_S_MIN, GRAB_OVER_S_MAX)?;
+            within(*over_s, BRUSH_OVER_S_MIN, FRAME_OVER_S_MAX)?;
             cap.map_or(Ok(()), |cap| within(cap, 0.0, f32::MAX))
         }
         Command::Push { center, radius, delta, limit } => {
@@ -48,11 +49,12 @@ pub fn check(command: &Command) -> Result<(), Reason> {
             points(&[*center])?;
             within(*radius, 0.0, COORDINATE_MAX)
         }
-        Command::MoveCollider { translation, rotation, .. }
-        | Command::MoveAnchor { translation, rotation, .. } => {
+        Command::MoveCollider { translation, rotation, over_s, .. }
+        | Command::MoveAnchor { translation, rotation, over_s, .. } => {
             points(&[*translation])?;
             numbers(rotation)?;
-            direction(rotation)
+            direction(rotation)?;
+            within(*over_s, 0.0, OVER_S_MAX)
         }
         Command::DriveBody(drive) => drive_body(drive),
         Command::Step { count: 0 } => Err(Reason::OutOfRange),
@@ -139,7 +141,8 @@ mod tests {
     fn numbers_out_of_range_are_refused() {
         for text in [
             r#"{"type":"grab","particle":1,"target":[0,1e8,0]}"#,
-            r#"{"type":"move","particle":1,"target":[0,0,0],"over_s":0.3}"#,
+            r#"{"type":"move","particle":1,"target":[0,0,0],"over_s":3601}"#,
+            r#"{"type":"move_collider","collider":0,"translation":[0,0,0],"over_s":-1}"#,
             r#"{"type":"brush","eye":[0,0,1],"ray":[0,0,0],"radius":1,"delta":[0,0,0],"over_s":0.1}"#,
             r#"{"type":"brush","eye":[0,0,1],"ray":[0,0,1],"radius":-1,"delta":[0,0,0],"over_s":0.1}"#,
             r#"{"type":"brush","eye":[0,0,1],"ray":[0,0,1],"radius":1,"delta":[0,0,0],"over_s":0}"#,

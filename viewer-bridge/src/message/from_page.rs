@@ -147,6 +147,8 @@ pub enum Command {
         translation: [f32; 3],
         #[serde(default = "no_rotation")]
         rotation: [f32; 4],
+        #[serde(default)]
+        over_s: f32,
     },
     DriveBody(BodyDrive),
     MoveAnchor {
@@ -154,6 +156,8 @@ pub enum Command {
         translation: [f32; 3],
         #[serde(default = "no_rotation")]
         rotation: [f32; 4],
+        #[serde(default)]
+        over_s: f32,
     },
     Lift {
         epoch: u32,

@@ -34,7 +34,7 @@ test("a wrong value is named with an example", () => {
     ["cut_radius", ["0 1", "1"], 'center: "0 1" is not 3 numbers (for example 0 1 0)'],
     ["cut_radius", ["0 1 x", "1"], 'center: "0 1 x" is not 3 numbers (for example 0 1 0)'],
     ["cut_radius", ["0 1 0", "wide"], 'radius: "wide" is not a number (for example 0.2)'],
-    ["move_anchor", ["0", "0 0 0", "1 0 0"], 'rotation: "1 0 0" is not 4 numbers (for example 0 0 0 1)'],
+    ["move_anchor", ["0", "0 0 0", "1 0 0", ""], 'rotation: "1 0 0" is not 4 numbers (for example 0 0 0 1)'],
     ["set", ["damping", "1 2", ""], 'value: "1 2" is not a number, three numbers or off (for example 0.5)'],
   ];
   for (const [command, texts, fault] of faults) assert.deepEqual(messageOf(command, texts, 3), { fault });

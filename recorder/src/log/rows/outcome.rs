@@ -167,6 +167,24 @@ struct ActionSchema {
     state_hash: Option<String>,
     #[schemars(skip_serializing_if = "Option::is_none")]
     text: Option<String>,
+    #[schemars(skip_serializing_if = "Option::is_none")]
+    object: Option<String>,
+    #[schemars(skip_serializing_if = "Option::is_none")]
+    object_index: Option<u32>,
+    #[schemars(skip_serializing_if = "Option::is_none")]
+    path: Option<Vec<PathPointSchema>>,
+    #[schemars(skip_serializing_if = "Option::is_none")]
+    append: Option<bool>,
+}
+
+/// The schema of a point of a path.
+#[derive(JsonSchema)]
+#[schemars(rename = "PathPoint")]
+#[allow(dead_code, reason = "only its schema is used")]
+struct PathPointSchema {
+    time: JsonNumber,
+    translation: [JsonNumber; 3],
+    rotation: [JsonNumber; 4],
 }
 
 /// The schema of `force`: of a release, or on a body.

@@ -3,7 +3,9 @@
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
-use sim_types::{Action, KindFilter, ParameterValue, RestoreContents, Text};
+use sim_types::{
+    Action, KindFilter, MovedObject, ParameterValue, PathPart, PathPoint, RestoreContents, Text,
+};
 
 /// Client id of every `sim-node ctl`, so that one call can release a particle that
 /// another call grabbed.
@@ -26,14 +28,15 @@ pub const CONSOLE_CLIENT_ID: u64 = 0;
 /// | 11 cut | constraint | | |
 /// | 12 cut_radius | | center | `number` radius |
 /// | 13 cut_segment | | from, to, direction | |
-/// | 14 move_anchor | anchor | translation | `rotation` |
-/// | 15 move_collider | collider | translation | `rotation` |
+/// | 14 move_anchor | anchor | translation | `rotation`, `number` over_s |
+/// | 15 move_collider | collider | translation | `rotation`, `number` over_s |
 /// | 16 set | block or collider | value, if a vector | `text` parameter, `number` value, `count` constraint kind |
 /// | 17 load | | | `text` scene |
 /// | 18 rewind | step, low 32 bits | | `count` step, high 32 bits; or [`CommandOptions::BACK`] and `count` steps |
 /// | 19 restore | hash, low 32 bits | | `count` hash, high 32 bits; [`CommandOptions::STATE`] or [`CommandOptions::MOTION`] |
 /// | 20 mark | | | `text` |
 /// | 21 drive_body | collider | translation, velocity, angular velocity | `rotation`, [`Command::wrench`] |
+/// | 22 follow | particle, anchor or collider | | [`CommandOptions::ANCHOR`] or [`CommandOptions::COLLIDER`], else a particle; [`CommandOptions::APPEND`]; `count` [`Command::points`] |
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable, ZeroCopySend)]
 #[repr(C)]
 #[type_name("catenary.Command")]
@@ -51,16 +54,17 @@ pub struct Command {
     pub vectors: [[f32; 3]; 3],
     /// Quaternion x, y, z, w.
     pub rotation: [f32; 4],
-    /// Time of grab and move in seconds, radius of push and `cut_radius`, value of set.
+    /// Time of grab, move, `move_anchor` and `move_collider` in seconds, radius of push and `cut_radius`, value of set.
     pub number: f32,
     /// Limit of push, if [`CommandOptions::LIMIT`] is set.
     pub limit: f32,
-    /// Number of steps of step; [`crate::ConstraintKind`] of set, if
+    /// Number of steps of step; number of points of follow; [`crate::ConstraintKind`] of set, if
     /// [`CommandOptions::CONSTRAINT_KIND`] is set.
     pub count: u32,
     /// [`CommandOptions`] bits.
     pub options: u32,
-    /// UTF-8 text, padded with zeros; force and torque of `drive_body`, see [`Command::wrench`].
+    /// UTF-8 text, padded with zeros; force and torque of `drive_body`, see [`Command::wrench`]; points of `follow`, see
+    /// [`Command::points`].
     pub text: [u8; Text::SIZE_BYTES_MAX],
     /// Always 0.
     pub spare: u32,
@@ -101,8 +105,12 @@ impl CommandOptions {
     pub const MOTION: u32 = 1 << 9;
     /// A set addresses the bends of one generated block.
     pub const BLOCK: u32 = 1 << 10;
-    /// A set addresses one collider.
+    /// A set addresses one collider; a follow moves a collider.
     pub const COLLIDER: u32 = 1 << 11;
+    /// A follow moves an anchor.
+    pub const ANCHOR: u32 = 1 << 12;
+    /// A follow appends its points.
+    pub const APPEND: u32 = 1 << 13;
 
     const VALUE_ANY: u32 = Self::VALUE_NUMBER | Self::VALUE_VECTOR | Self::VALUE_OFF;
 }
@@ -129,6 +137,7 @@ mod kind {
     pub(super) const RESTORE: u32 = 19;
     pub(super) const MARK: u32 = 20;
     pub(super) const DRIVE_BODY: u32 = 21;
+    pub(super) const FOLLOW: u32 = 22;
     /// No version will assign it.
     pub(super) const UNKNOWN: u32 = u32::MAX;
 }
@@ -136,6 +145,10 @@ mod kind {
 const ZERO: [f32; 3] = [0.0; 3];
 
 const WRENCH_SIZE_BYTES: usize = size_of::<[[f32; 3]; 2]>();
+
+/// A time and a pose.
+const POINT_SIZE_BYTES: usize = size_of::<f64>() + size_of::<[f32; 7]>();
+const _: () = assert!(Text::SIZE_BYTES_MAX / POINT_SIZE_BYTES == PathPart::POINTS_MAX);
 
 impl Command {
     /// Encodes an action as the command `sequence` of the client `client_id`.
@@ -175,14 +188,24 @@ impl Command {
             Action::CutSegment { from, to, direction } => {
                 Self { vectors: [from, to, direction], ..Self::with_kind(kind::CUT_SEGMENT, 0) }
             }
-            Action::MoveAnchor { anchor, translation, rotation } => Self {
+            Action::MoveAnchor { anchor, translation, rotation, over_s } => Self {
                 rotation,
-                ..Self::with_kind(kind::MOVE_ANCHOR, anchor).with_vector(translation, 0.0)
+                ..Self::with_kind(kind::MOVE_ANCHOR, anchor).with_vector(translation, over_s)
             },
-            Action::MoveCollider { collider, translation, rotation } => Self {
+            Action::MoveCollider { collider, translation, rotation, over_s } => Self {
                 rotation,
-                ..Self::with_kind(kind::MOVE_COLLIDER, collider).with_vector(translation, 0.0)
+                ..Self::with_kind(kind::MOVE_COLLIDER, collider).with_vector(translation, over_s)
             },
+            Action::Follow { object, object_index, path, append } => {
+                let object = match object {
+                    MovedObject::Particle => 0,
+                    MovedObject::Anchor => CommandOptions::ANCHOR,
+                    MovedObject::Collider => CommandOptions::COLLIDER,
+                };
+                let append = if append { CommandOptions::APPEND } else { 0 };
+                let follow = Self::with_kind(kind::FOLLOW, object_index);
+                Self { options: object | append, ..follow.with_points(path.points()) }
+            }
             Action::Set { parameter, value, constraint_kind, block, collider } => {
                 let set = Self::from_value(value).with_parameter(parameter);
                 set.with_constraints(constraint_kind)
@@ -268,6 +291,31 @@ impl Command {
         bytemuck::pod_read_unaligned(&self.text[..WRENCH_SIZE_BYTES])
     }
 
+    fn with_points(self, points: &[PathPoint]) -> Self {
+        let mut command = self;
+        command.count = u32::try_from(points.len()).unwrap_or(0);
+        for (bytes, point) in command.text.chunks_exact_mut(POINT_SIZE_BYTES).zip(points) {
+            let PathPoint { time, translation, rotation } = point;
+            bytes[..8].copy_from_slice(&time.to_le_bytes());
+            bytes[8..20].copy_from_slice(bytemuck::bytes_of(translation));
+            bytes[20..].copy_from_slice(bytemuck::bytes_of(rotation));
+        }
+        command
+    }
+
+    /// Points of `follow`: `count` of them, each a time in s as an f64, a translation and a rotation, in `text`.
+    /// `None` if there are more than [`PathPart::POINTS_MAX`].
+    pub fn points(&self) -> Option<PathPart> {
+        let point = |bytes: &[u8]| PathPoint {
+            time: bytemuck::pod_read_unaligned(&bytes[..8]),
+            translation: bytemuck::pod_read_unaligned(&bytes[8..20]),
+            rotation: bytemuck::pod_read_unaligned(&bytes[20..]),
+        };
+        let all = self.text.chunks_exact(POINT_SIZE_BYTES).map(point);
+        let points: [PathPoint; PathPart::POINTS_MAX] = all.collect::<Vec<_>>().try_into().ok()?;
+        PathPart::new(points.get(..self.count as usize)?)
+    }
+
     fn from_value(value: ParameterValue) -> Self {
         let empty = Self::with_kind(kind::SET, 0);
         match value {
@@ -326,10 +374,24 @@ impl Command {
             kind::CUT => Action::Cut { constraint: index },
             kind::CUT_RADIUS => Action::CutRadius { center: first, radius: number },
             kind::CUT_SEGMENT => Action::CutSegment { from: first, to: second, direction: third },
-            kind::MOVE_ANCHOR => Action::MoveAnchor { anchor: index, translation: first, rotation },
-            kind::MOVE_COLLIDER => {
-                Action::MoveCollider { collider: index, translation: first, rotation }
+            kind::MOVE_ANCHOR => {
+                Action::MoveAnchor { anchor: index, translation: first, rotation, over_s: number }
             }
+            kind::MOVE_COLLIDER => Action::MoveCollider {
+                collider: index,
+                translation: first,
+                rotation,
+                over_s: number,
+            },
+            kind::FOLLOW => match self.moved_object().zip(self.points()) {
+                Some((object, path)) => Action::Follow {
+                    object,
+                    object_index: index,
+                    path,
+                    append: self.has(CommandOptions::APPEND),
+                },
+                None => Action::Unknown { number: kind::FOLLOW },
+            },
             kind::SET => match self.set_value() {
                 Some(value) => self.set_action(value),
                 None => Action::Unknown { number: kind::SET },
@@ -357,6 +419,15 @@ impl Command {
                 }
             }
             number => Action::Unknown { number },
+        }
+    }
+
+    fn moved_object(&self) -> Option<MovedObject> {
+        match self.options & (CommandOptions::ANCHOR | CommandOptions::COLLIDER) {
+            0 => Some(MovedObject::Particle),
+            CommandOptions::ANCHOR => Some(MovedObject::Anchor),
+            CommandOptions::COLLIDER => Some(MovedObject::Collider),
+            _ => None,
         }
     }
 
@@ -421,7 +492,7 @@ mod tests {
         let mut numbers: Vec<_> =
             Action::samples().into_iter().map(|action| Command::new(0, 0, action).kind).collect();
         numbers.dedup();
-        let expected: Vec<_> = (1..=21).chain([99]).collect();
+        let expected: Vec<_> = (1..=22).chain([99]).collect();
         assert_eq!(numbers, expected);
         for kind in (0..=1000).filter(|kind| !numbers.contains(kind)) {
             let action = Command { kind, ..Command::new(0, 0, Action::Pause) }.action();
@@ -434,7 +505,7 @@ mod tests {
         for number in (0..=100).chain([u32::MAX - 1, u32::MAX]) {
             let decoded = Command::new(0, 0, Action::Unknown { number }).action();
             let is_known =
-                (1..=21).contains(&number) && ![kind::SET, kind::RESTORE].contains(&number);
+                (1..=22).contains(&number) && ![kind::SET, kind::RESTORE].contains(&number);
             let expected = if is_known { u32::MAX } else { number };
             assert_eq!(decoded, Action::Unknown { number: expected });
         }

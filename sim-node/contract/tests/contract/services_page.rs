@@ -284,7 +284,7 @@ fn state_numbers() -> [Numbers; 10] {
     ]
 }
 
-const OPTIONS: [(u32, &str); 12] = [
+const OPTIONS: [(u32, &str); 14] = [
     (CommandOptions::LIMIT, "limit"),
     (CommandOptions::VALUE_NUMBER, "value is a number"),
     (CommandOptions::VALUE_VECTOR, "value is a vector"),
@@ -297,6 +297,8 @@ const OPTIONS: [(u32, &str); 12] = [
     (CommandOptions::MOTION, "motion"),
     (CommandOptions::BLOCK, "block"),
     (CommandOptions::COLLIDER, "collider"),
+    (CommandOptions::ANCHOR, "anchor"),
+    (CommandOptions::APPEND, "append"),
 ];
 
 #[test]

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from typing import Any, Generic, TypeVar
+from collections.abc import Iterable, Mapping
+from typing import Any, Generic, Literal, TypeVar
 
 from catenary._catenary import Action
 from catenary._types import Vector
@@ -30,7 +30,7 @@ class Commands(ABC, Generic[Result]):
     def grab(self, particle: int, target: Vector, over: float = 1 / 60) -> Result:
         """Grabs a particle and moves it along a straight line to `target`.
 
-        `over` is the time to the target, from 0 to 0.25 s. The particle follows only this client until
+        `over` is the time to the target, from 0 to 3600 s. The particle follows only this client until
         `release`, or until the client ends.
         """
         return self._perform(Action.grab(particle, target, over))
@@ -68,22 +68,53 @@ class Commands(ABC, Generic[Result]):
         return self._perform(Action.cut_segment(start, end, direction))
 
     def move_anchor(
-        self, anchor: int, translation: Vector, rotation: Vector = (0.0, 0.0, 0.0, 1.0)
+        self,
+        anchor: int,
+        translation: Vector,
+        rotation: Vector = (0.0, 0.0, 0.0, 1.0),
+        over: float = 0.0,
     ) -> Result:
         """Moves an anchor of the scene to a pose relative to the loaded one. It stays there.
 
-        `rotation` is a quaternion x, y, z, w.
+        `rotation` is a quaternion x, y, z, w. `over` is the time to the pose, up to 3600 s, and at least one step.
         """
-        return self._perform(Action.move_anchor(anchor, translation, rotation))
+        return self._perform(Action.move_anchor(anchor, translation, rotation, over))
 
     def move_collider(
-        self, collider: int, translation: Vector, rotation: Vector = (0.0, 0.0, 0.0, 1.0)
+        self,
+        collider: int,
+        translation: Vector,
+        rotation: Vector = (0.0, 0.0, 0.0, 1.0),
+        over: float = 0.0,
     ) -> Result:
-        """Moves a collider to a pose relative to the loaded one, during the next step.
+        """Moves a collider to a pose relative to the loaded one.
 
-        Particles in contact feel the velocity of the motion. `rotation` is a quaternion x, y, z, w.
+        Particles in contact feel the velocity of the motion. `rotation` is a quaternion x, y, z, w. `over` is the time
+        to the pose, up to 3600 s, and at least one step.
         """
-        return self._perform(Action.move_collider(collider, translation, rotation))
+        return self._perform(Action.move_collider(collider, translation, rotation, over))
+
+    def follow(
+        self,
+        object: Literal["particle", "anchor", "collider"],
+        index: int,
+        path: Iterable[Iterable[float]],
+        *,
+        append: bool = False,
+    ) -> Result:
+        """Leads a particle that this client has grabbed, an anchor or a collider along points in time.
+
+        `path` is an array of shape (n, 4), with the time in s after this command, x, y and z in each row, or (n, 8)
+        with a quaternion x, y, z, w behind them. Points are as those of `grab` and `move_collider`. Times ascend, up to
+        3600 s. The object moves linearly from where it is, and stays at the last point. With `append`, the points
+        come after those of the motion under way, and their times count from its beginning. At most 2048 points of all
+        motions are on their way. Four points are a command, in the order given; the result is that of the last one.
+        """
+        rows = [[float(number) for number in row] for row in path]
+        return self._perform_all(Action.follow(object, index, rows, append))
+
+    def _perform_all(self, actions: list[Action]) -> Result:
+        return [self._perform(action) for action in actions][-1]
 
     def drive_body(
         self,

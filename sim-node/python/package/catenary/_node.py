@@ -28,6 +28,15 @@ class Node(Commands[Outcome], _catenary.Node):
     def _perform(self, action: Action) -> Outcome:
         return self.request(action)
 
+    def _perform_all(self, actions: list[Action]) -> Outcome:
+        """Performs the actions of a command that takes several, such as those of a long path, in one batch."""
+        if len(actions) == 1:
+            return self._perform(actions[0])
+        with self.batch() as batch:
+            for action in actions:
+                batch._perform(action)
+        return batch.outcomes[-1]
+
     def snapshots(self) -> Iterator[Snapshot]:
         """Yields each snapshot in turn, beginning with the newest one. Ends when the node ends.
 

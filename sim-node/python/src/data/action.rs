@@ -4,8 +4,10 @@ use std::path::{Path, PathBuf};
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use sim_contract::{ConstraintKind, GRAB_OVER_S_DEFAULT, KindFilter, Text, read_scene_file};
-use sim_solver::Scene;
+use sim_contract::{
+    ConstraintKind, GRAB_OVER_S_DEFAULT, KindFilter, MovedObject, PathPoint, Text, read_scene_file,
+};
+use sim_solver::{MOTION_POINTS_MAX, Scene};
 use sim_solver::scene::is_path;
 
 use crate::arguments;
@@ -106,25 +108,58 @@ impl Action {
     }
 
     #[staticmethod]
-    #[pyo3(signature = (anchor, translation, rotation=Quaternion::IDENTITY))]
+    #[pyo3(signature = (anchor, translation, rotation=Quaternion::IDENTITY, over=0.0))]
     fn move_anchor(
         #[pyo3(from_py_with = arguments::anchor)] anchor: u32,
         translation: Vector,
         rotation: Quaternion,
+        over: f32,
     ) -> Self {
         let (translation, rotation) = (translation.0, rotation.0);
-        Self(sim_contract::Action::MoveAnchor { anchor, translation, rotation })
+        Self(sim_contract::Action::MoveAnchor { anchor, translation, rotation, over_s: over })
     }
 
     #[staticmethod]
-    #[pyo3(signature = (collider, translation, rotation=Quaternion::IDENTITY))]
+    #[pyo3(signature = (collider, translation, rotation=Quaternion::IDENTITY, over=0.0))]
     fn move_collider(
         #[pyo3(from_py_with = arguments::collider)] collider: u32,
         translation: Vector,
         rotation: Quaternion,
+        over: f32,
     ) -> Self {
         let (translation, rotation) = (translation.0, rotation.0);
-        Self(sim_contract::Action::MoveCollider { collider, translation, rotation })
+        Self(sim_contract::Action::MoveCollider { collider, translation, rotation, over_s: over })
+    }
+
+    /// Returns the actions that lead an object along points, each a list of 4 or 8 numbers.
+    #[staticmethod]
+    #[pyo3(signature = (object, index, path, append=false))]
+    fn follow(
+        object: &str,
+        index: u32,
+        path: Vec<Vec<f64>>,
+        append: bool,
+    ) -> PyResult<Vec<Self>> {
+        let object = match object {
+            "particle" => MovedObject::Particle,
+            "anchor" => MovedObject::Anchor,
+            "collider" => MovedObject::Collider,
+            _ => {
+                let problem = format!("'{object}' cannot move (allowed: particle, anchor, collider)");
+                return Err(PyValueError::new_err(problem));
+            }
+        };
+        let points = path.iter().map(|row| PathPoint::from_row(row));
+        let points: Vec<_> = points
+            .collect::<Result<_, _>>()
+            .map_err(|error| PyValueError::new_err(error.to_string()))?;
+        if points.is_empty() || points.len() > MOTION_POINTS_MAX {
+            let count = points.len();
+            let problem = format!("a path of {count} points (allowed: 1 to {MOTION_POINTS_MAX})");
+            return Err(PyValueError::new_err(problem));
+        }
+        let actions = sim_contract::Action::follow(object, index, &points, append);
+        Ok(actions.into_iter().map(Self).collect())
     }
 
     #[staticmethod]

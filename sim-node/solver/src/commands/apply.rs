@@ -1,8 +1,9 @@
 //! Applies actions: the only way from a command to the state.
 
-use sim_types::{Action, CLIENT_ID_END, Parameter, ParameterValue, Reason, Text};
+use sim_types::{Action, CLIENT_ID_END, MovedObject, Parameter, ParameterValue, Reason, Text};
 
 use super::cut::{Sphere, Sweep};
+use super::moves::Follow;
 use super::{Grab, Push};
 use crate::contacts::bodies::driven_body::BodyMotion;
 use crate::frame::Pose;
@@ -87,11 +88,17 @@ impl Solver {
             Action::CutSegment { from, to, direction } => {
                 self.cut_segment(Sweep { from, to, direction })?;
             }
-            Action::MoveAnchor { anchor, translation, rotation } => {
-                self.move_anchor(anchor, Pose { translation, rotation })?;
+            Action::MoveAnchor { anchor, translation, rotation, over_s } => {
+                self.move_anchor_over(anchor, Pose { translation, rotation }, over_s)?;
             }
-            Action::MoveCollider { collider, translation, rotation } => {
-                self.move_collider(collider, Pose { translation, rotation })?;
+            Action::MoveCollider { collider, translation, rotation, over_s } => {
+                self.move_collider_over(collider, Pose { translation, rotation }, over_s)?;
+            }
+            Action::Follow { object, object_index: index, path, append } => {
+                self.follow(client_id, &Follow { object, index, points: path.points(), append })?;
+                if object == MovedObject::Particle {
+                    return Ok(Applied::Target);
+                }
             }
             Action::DriveBody {
                 collider,

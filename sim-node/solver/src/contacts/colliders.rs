@@ -10,6 +10,7 @@ use super::contact_substep::ContactSubstep;
 use super::mesh::collision_mesh::CollisionMesh;
 use super::placed_shape::PlacedShape;
 use crate::frame::{Frame, angular_velocity, rotation_about};
+use crate::motion::{Motion, Path};
 use crate::parameters::surfaces::ColliderSurface;
 use crate::scene::definition::collider::{ColliderBody, ColliderGeometry, SceneCollider};
 
@@ -26,8 +27,12 @@ pub(crate) struct Collider {
     pub(crate) body: Option<ColliderBody>,
     /// The copy of the body in the next or the running step; None in a step without its command.
     pub(crate) driven: Option<DrivenBody>,
-    /// Frame that a client has set; it replaces the collider's own motion.
+    /// Its path in the scene, in place of a constant velocity.
+    path: Path,
+    /// Frame to which a client has moved it; it replaces the collider's own motion.
     pub(crate) moved: Option<Frame>,
+    /// The motion of a client, which moves that frame.
+    pub(crate) motion: Option<Motion>,
     /// Frame at the start of the running step.
     start: Frame,
     /// Frame at the end of the running step.
@@ -56,7 +61,7 @@ pub struct PlacedCollider {
 impl Collider {
     /// `index` is that of the collider in the scene.
     pub(crate) fn new(index: usize, scene: &SceneCollider) -> Self {
-        Self {
+        let mut collider = Self {
             at_load: PlacedShape::new(&scene.shape),
             mesh: scene.mesh.as_ref().map(|mesh| Arc::new(CollisionMesh::new(mesh, index))),
             surface: ColliderSurface::from(scene),
@@ -64,12 +69,18 @@ impl Collider {
             angular_velocity: Vec3::from_array(scene.angular_velocity).as_dvec3(),
             body: scene.body,
             driven: None,
+            path: Path::new(&scene.path, scene.repeat),
             moved: None,
+            motion: None,
             start: Frame::AT_LOAD,
             end: Frame::AT_LOAD,
             linear: Vec3::from_array(scene.velocity),
             angular: Vec3::from_array(scene.angular_velocity),
+        };
+        if !collider.path.is_empty() {
+            collider.place(0.0);
         }
+        collider
     }
 
     /// Prepares a solid mesh for many steps.
@@ -85,14 +96,21 @@ impl Collider {
         frame.rotation == Quat::IDENTITY || !matches!(self.at_load, PlacedShape::Bounds { .. })
     }
 
-    /// Moves it to a frame by the end of the next step.
-    pub(crate) fn move_to(&mut self, frame: Frame) -> Result<(), Reason> {
-        if !self.accepts(&frame) {
-            return Err(Reason::OutOfRange);
-        }
-        self.moved = Some(frame);
+    /// Moves it to a frame that it accepts by the end of the next step.
+    pub(crate) fn move_to(&mut self, frame: Frame) {
+        (self.moved, self.motion) = (Some(frame), None);
         self.driven = None;
-        Ok(())
+    }
+
+    /// Moves it along a motion whose frames it accepts.
+    pub(crate) fn follow_motion(&mut self, motion: Motion) {
+        (self.moved, self.motion) = (Some(self.end), Some(motion));
+        self.driven = None;
+    }
+
+    /// Its frame between two steps.
+    pub(crate) fn current(&self) -> Frame {
+        self.end
     }
 
     /// Drives its body in the next step, which takes `dt` seconds, from a frame.
@@ -108,14 +126,14 @@ impl Collider {
         if !driven.bears_wrench(dt) {
             return Err(Reason::OutOfRange);
         }
-        self.moved = Some(frame);
+        (self.moved, self.motion) = (Some(frame), None);
         self.driven = Some(driven);
         Ok(())
     }
 
     /// Forgets the frame and the motion that clients have set.
     pub(crate) fn reset(&mut self) {
-        (self.moved, self.driven) = (None, None);
+        (self.moved, self.motion, self.driven) = (None, None, None);
         self.place(0.0);
     }
 
@@ -124,19 +142,22 @@ impl Collider {
         self.driven = None;
         self.end = self.frame(time_s);
         self.start = self.end;
-        let is_own = self.moved.is_none();
+        let is_own = self.moved.is_none() && self.path.is_empty();
         self.linear = if is_own { self.velocity.as_vec3() } else { Vec3::ZERO };
         self.angular = if is_own { self.angular_velocity.as_vec3() } else { Vec3::ZERO };
     }
 
-    /// Begins a step that ends at `time_s` and takes `dt`, both in seconds.
-    pub(crate) fn begin_step(&mut self, time_s: f64, dt: f32) {
+    /// Begins a step that ends as `scene_step`, at `time_s`, and takes `dt`, both in seconds.
+    pub(crate) fn begin_step(&mut self, scene_step: u64, time_s: f64, dt: f32) {
         self.start = self.end;
+        if let Some(motion) = &self.motion {
+            self.moved = Some(motion.frame(scene_step));
+        }
         self.end = self.frame(time_s);
         if let Some(body) = &self.driven {
             self.follow(body.at_start());
             self.start = self.end;
-        } else if self.moved.is_some() {
+        } else if self.moved.is_some() || !self.path.is_empty() {
             self.linear = (self.end.translation - self.start.translation) / dt;
             self.angular = angular_velocity(self.start.rotation, self.end.rotation, dt);
         }
@@ -176,10 +197,13 @@ impl Collider {
         self.body.is_some() && self.moved.is_some() && self.driven.is_none()
     }
 
-    /// Frame by its own motion, or the one that a client has set.
+    /// Frame by its own motion, or the one to which a client has moved it.
     fn frame(&self, time_s: f64) -> Frame {
         if let Some(moved) = self.moved {
             return moved;
+        }
+        if !self.path.is_empty() {
+            return self.path.frame(time_s);
         }
         let speed = self.angular_velocity.dot(self.angular_velocity).sqrt();
         if speed == 0.0 {

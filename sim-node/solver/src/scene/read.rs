@@ -3,6 +3,7 @@
 mod anchor;
 mod body;
 mod collider;
+mod collider_path;
 mod contact;
 mod element;
 mod file_scene;

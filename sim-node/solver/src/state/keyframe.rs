@@ -8,6 +8,7 @@ use sim_types::{Method, ParameterValues, ParticleFlags, TearCause};
 
 use crate::constraints::tethers::TetherBasis;
 use crate::frame::{Frame, Pose};
+use crate::motion::{MOTION_POINTS_MAX, MOTION_SIZE_BYTES_MAX, Motion, MotionState};
 use crate::parameters::Parameters;
 use crate::parameters::block_bending::BlockBending;
 use crate::parameters::surfaces::{ColliderSurface, Surfaces};
@@ -16,7 +17,7 @@ use crate::step::drive::ActiveGrab;
 
 /// First four bytes of an encoded keyframe, little-endian. It changes with the fields below.
 const KEYFRAME_VERSION: u32 = 5;
-/// The version before the surfaces of colliders could change.
+/// The version before the surfaces of colliders could change, and before motions lasted longer than a grab's horizon.
 const WITHOUT_SURFACES_VERSION: u32 = 4;
 /// The version before blocks could have a bending of their own.
 const WITHOUT_BLOCKS_VERSION: u32 = 3;
@@ -39,6 +40,23 @@ pub struct Keyframe {
     /// Anchors and colliders that clients have moved, ascending by index.
     pub(super) moved_anchors: Vec<Moved>,
     pub(super) moved_colliders: Vec<Moved>,
+    /// The motions of clients, which move those, and the targets of grabs. Encoded behind the other fields.
+    #[serde(skip)]
+    pub(super) motions: Motions,
+}
+
+/// Motions by object, ascending by its index.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct Motions {
+    pub(super) grabs: Vec<MotionState>,
+    pub(super) anchors: Vec<MotionState>,
+    pub(super) colliders: Vec<MotionState>,
+}
+
+impl Motions {
+    pub(super) fn all(&self) -> impl Iterator<Item = &MotionState> {
+        self.grabs.iter().chain(&self.anchors).chain(&self.colliders)
+    }
 }
 
 /// An anchor or a collider that a client has moved.
@@ -132,6 +150,7 @@ impl Keyframe {
             + size_of_val(self.moved_colliders.as_slice())
             + self.parameters.block_bending.size_bytes()
             + size_of_val(self.parameters.surfaces.all())
+            + self.motions.all().map(MotionState::size_bytes).sum::<usize>()
     }
 
     /// Returns the cause of each tear in [`Self::torn`].
@@ -140,7 +159,7 @@ impl Keyframe {
     }
 
     /// Encodes the keyframe: its version as a little-endian u32, then the fields in postcard's
-    /// encoding, the bending of each generated block, and the surface of each collider.
+    /// encoding, the bending of each generated block, the surface of each collider, and the motions.
     ///
     /// # Panics
     /// Never: the fields always have an encoding.
@@ -148,7 +167,7 @@ impl Keyframe {
     pub fn encode(&self) -> Vec<u8> {
         let bytes = KEYFRAME_VERSION.to_le_bytes().to_vec();
         let Parameters { block_bending, surfaces, .. } = &self.parameters;
-        let fields = (self, block_bending.used(), surfaces.all());
+        let fields = (self, block_bending.used(), surfaces.all(), &self.motions);
         postcard::to_extend(&fields, bytes).expect("numbers have an encoding")
     }
 
@@ -163,8 +182,9 @@ impl Keyframe {
         };
         let (keyframe, rest) = match u32::from_le_bytes(*version) {
             KEYFRAME_VERSION => {
-                let ((keyframe, blocks, surfaces), rest) = postcard::take_from_bytes(fields)?;
-                (Self::with(keyframe, blocks, surfaces), rest)
+                let ((keyframe, blocks, surfaces, motions), rest) =
+                    postcard::take_from_bytes(fields)?;
+                (Self { motions, ..Self::with(keyframe, blocks, surfaces) }, rest)
             }
             WITHOUT_SURFACES_VERSION => {
                 let ((keyframe, blocks), rest) = postcard::take_from_bytes(fields)?;
@@ -203,13 +223,26 @@ impl Solver {
             paused: false,
             scene_step: self.scene_step,
             fixed,
-            grabs: self.grabs.clone(),
+            grabs: self.grabs.iter().map(ActiveGrab::without_motion).collect(),
             torn: self.torn().to_vec(),
             tear_causes: self.tear_causes().to_vec(),
             tethers: self.tethers.basis.clone(),
             parameters: self.parameters.clone(),
             moved_anchors: Moved::all(self.anchors.moved.iter()),
             moved_colliders: Moved::all(self.colliders.iter().map(|one| &one.moved)),
+            motions: self.motion_states(),
+        }
+    }
+
+    fn motion_states(&self) -> Motions {
+        let state = |index, motion: &Option<Motion>| {
+            motion.as_ref().map(|motion| motion.state(index, self.scene_step))
+        };
+        let (anchors, colliders) = ((0..).zip(&self.anchors.motions), (0..).zip(&self.colliders));
+        Motions {
+            grabs: self.grabs.iter().filter_map(|one| state(one.particle, &one.motion)).collect(),
+            anchors: anchors.filter_map(|(index, motion)| state(index, motion)).collect(),
+            colliders: colliders.filter_map(|(index, one)| state(index, &one.motion)).collect(),
         }
     }
 
@@ -226,7 +259,8 @@ impl Solver {
         let (root, basis) = if self.settings.has_tethers() { (index, link) } else { (0, 0) };
         let parameters = 2 * 12 + 4 * 4 + 2 * 5 + 9 * 5 + 10 + self.model.bent_blocks.len() * 5;
         let surface = 2 * 4;
-        let head = 4 + 1 + 10 + 9 * 10 + parameters;
+        let motions = 3 * 10 + MOTION_POINTS_MAX * MOTION_SIZE_BYTES_MAX;
+        let head = 4 + 1 + 10 + 9 * 10 + parameters + motions;
         head + self.particle_count() * (fixed + grab + root)
             + self.constraint_count() * (torn + cause + basis)
             + (self.anchor_count() + self.collider_count()) * moved

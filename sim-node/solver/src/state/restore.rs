@@ -5,9 +5,10 @@ mod check;
 use sim_types::ParticleFlags;
 use thiserror::Error;
 
+use crate::motion::{Motion, MotionState};
 use crate::solver::{Due, Solver};
 use crate::state::hash::state_hash;
-use crate::state::keyframe::Keyframe;
+use crate::state::keyframe::{Keyframe, Motions};
 use crate::state::particles::Particle;
 
 /// Error of restoring a snapshot and a keyframe.
@@ -54,6 +55,7 @@ impl Solver {
         self.frozen_count = frozen.count() as u64;
         self.grabs.extend_from_slice(&keyframe.grabs);
         self.scene_step = keyframe.scene_step;
+        self.restore_motions(&keyframe.motions);
         self.is_put_in_place = false;
         self.parameters.clone_from(&keyframe.parameters);
         self.parameters.block_bending.make_room_for(self.model.bent_blocks.len());
@@ -88,6 +90,21 @@ impl Solver {
         let time_s = self.scene_time_s();
         for collider in &mut self.colliders {
             collider.place(time_s);
+        }
+    }
+
+    fn restore_motions(&mut self, motions: &Motions) {
+        let restored = |state: &MotionState| Some(Motion::restored(state, self.scene_step));
+        for state in &motions.grabs {
+            if let Ok(place) = self.grabs.binary_search_by_key(&state.index, |one| one.particle) {
+                self.grabs[place].motion = restored(state);
+            }
+        }
+        for state in &motions.anchors {
+            self.anchors.motions[state.index as usize] = restored(state);
+        }
+        for state in &motions.colliders {
+            self.colliders[state.index as usize].motion = restored(state);
         }
     }
 

@@ -1,12 +1,13 @@
 //! Anchors: moving frames, and the particles that follow them.
 
-use glam::{DQuat, DVec3, Vec3};
+use glam::Vec3;
 
 use sim_types::ParticleFlags;
 
 use super::drive::{DriveTarget, drive_towards};
-use crate::frame::{Frame, Pose};
-use crate::scene::definition::anchor::{SceneAnchor, Waypoint};
+use crate::frame::Frame;
+use crate::motion::{Motion, Path};
+use crate::scene::definition::anchor::SceneAnchor;
 use crate::scene::definition::element::SceneParticle;
 use crate::state::particles::{Particle, Particles};
 use crate::store::ParticleStore;
@@ -15,8 +16,10 @@ use crate::store::ParticleStore;
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Anchors {
     paths: Vec<AnchorPath>,
-    /// By anchor: frame that a client has set; it replaces the path.
+    /// By anchor: frame to which a client has moved it; it replaces the path.
     pub(crate) moved: Vec<Option<Frame>>,
+    /// By anchor: the motion of a client, which moves that frame.
+    pub(crate) motions: Vec<Option<Motion>>,
     /// By anchor: frame at the end of the running step.
     frames: Vec<Frame>,
     followers: Vec<Follower>,
@@ -24,12 +27,11 @@ pub(crate) struct Anchors {
     targets: Vec<[f32; 3]>,
 }
 
-/// The motion of one frame.
+/// The path of one frame.
 #[derive(Debug, Clone)]
 struct AnchorPath {
     origin: Vec3,
-    waypoints: Vec<Waypoint>,
-    is_repeated: bool,
+    path: Path,
 }
 
 /// A particle that follows a frame.
@@ -48,8 +50,7 @@ impl Anchors {
     pub(crate) fn new(scene: &[SceneAnchor], particles: &[SceneParticle]) -> Self {
         let path = |anchor: &SceneAnchor| AnchorPath {
             origin: Vec3::from_array(anchor.origin),
-            waypoints: anchor.path.clone(),
-            is_repeated: anchor.repeat,
+            path: Path::new(&anchor.path, anchor.repeat),
         };
         let followers: Vec<_> = (0..)
             .zip(scene)
@@ -63,6 +64,7 @@ impl Anchors {
         Self {
             paths: scene.iter().map(path).collect(),
             moved: vec![None; scene.len()],
+            motions: vec![None; scene.len()],
             frames: vec![Frame::AT_LOAD; scene.len()],
             targets: vec![[0.0; 3]; followers.len()],
             followers,
@@ -72,12 +74,22 @@ impl Anchors {
     /// Returns every frame to its path.
     pub(crate) fn reset(&mut self) {
         self.moved.fill(None);
+        self.motions.fill(None);
+    }
+
+    /// Frame of an anchor between two steps, at `time_s` in seconds. None if it is unknown.
+    pub(crate) fn frame(&self, anchor: u32, time_s: f64) -> Option<Frame> {
+        let moved = self.moved.get(anchor as usize)?;
+        Some(moved.unwrap_or_else(|| self.paths[anchor as usize].path.frame(time_s)))
     }
 
     /// Computes the targets of the followers for a step that ends at `time_s`, in seconds.
-    pub(crate) fn begin_step(&mut self, time_s: f64) {
+    pub(crate) fn begin_step(&mut self, scene_step: u64, time_s: f64) {
+        for (moved, motion) in self.moved.iter_mut().zip(&self.motions) {
+            *moved = motion.as_ref().map_or(*moved, |motion| Some(motion.frame(scene_step)));
+        }
         let motions = self.paths.iter().zip(&self.moved);
-        for (frame, (path, moved)) in self.frames.iter_mut().zip(motions) {
+        for (frame, (AnchorPath { path, .. }, moved)) in self.frames.iter_mut().zip(motions) {
             *frame = moved.unwrap_or_else(|| path.frame(time_s));
         }
         for (follower, target) in self.followers.iter().zip(&mut self.targets) {
@@ -124,43 +136,4 @@ impl Anchors {
             states[*particle as usize].flags & (HELD | ParticleFlags::GRABBED) == 0
         })
     }
-}
-
-impl AnchorPath {
-    /// Frame at a time: interpolated between waypoints, constant before the first and after the last.
-    fn frame(&self, time_s: f64) -> Frame {
-        let (Some(first), Some(last)) = (self.waypoints.first(), self.waypoints.last()) else {
-            return Frame::AT_LOAD;
-        };
-        let mut time_s = time_s;
-        if self.is_repeated && time_s > last.time {
-            let period = last.time - first.time;
-            time_s -= ((time_s - first.time) / period).floor() * period;
-        }
-        let next = self.waypoints.partition_point(|waypoint| waypoint.time <= time_s);
-        if next == 0 || next == self.waypoints.len() {
-            let Waypoint { translation, rotation, .. } = if next == 0 { *first } else { *last };
-            return Frame::from_pose(&Pose { translation, rotation });
-        }
-        let (from, to) = (&self.waypoints[next - 1], &self.waypoints[next]);
-        let share = (time_s - from.time) / (to.time - from.time);
-        Frame::new(translation_between(from, to, share), rotation_between(from, to, share))
-    }
-}
-
-fn translation_between(from: &Waypoint, to: &Waypoint, share: f64) -> DVec3 {
-    let vector = |waypoint: &Waypoint| Vec3::from_array(waypoint.translation).as_dvec3();
-    vector(from) * (1.0 - share) + vector(to) * share
-}
-
-/// Normalised linear interpolation along the shorter arc. [`Frame::new`] normalises.
-fn rotation_between(from: &Waypoint, to: &Waypoint, share: f64) -> DQuat {
-    let unit =
-        |waypoint: &Waypoint| DQuat::from_array(waypoint.rotation.map(f64::from)).normalize();
-    let (from, to) = (unit(from), unit(to));
-    let from = if from.dot(to) < 0.0 { -from } else { from };
-    let blend = from * (1.0 - share) + to * share;
-    // Opposite rotations have no middle, so the nearer end replaces it.
-    let is_degenerate = blend.dot(blend) < 1e-12;
-    if is_degenerate { if share < 0.5 { from } else { to } } else { blend }
 }

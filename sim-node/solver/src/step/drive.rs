@@ -3,19 +3,35 @@
 use serde::{Deserialize, Serialize};
 
 use super::substep::Substep;
+use crate::motion::Motion;
 use crate::store::{Location, ParticleStore};
 
-/// Longest time in seconds that a grabbed particle may take to its target.
-pub const GRAB_OVER_S_MAX: f32 = 0.25;
+/// Longest time in seconds for which a grabbed particle heads for one point. A longer motion has points between.
+pub(crate) const GRAB_HORIZON_S: f32 = 0.25;
+
+/// Most substeps for which a particle in a longer motion heads for one point. A slow particle moves once its share of the
+/// way exceeds half of the rounding of its position, so it is at most half of this number of roundings behind.
+pub(crate) const GRAB_HORIZON_SUBSTEPS: u32 = 256;
 
 /// A grabbed particle.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct ActiveGrab {
     pub(crate) particle: u32,
     pub(crate) client_id: u64,
     pub(crate) target: [f32; 3],
     /// Steps until the target is reached.
     pub(crate) steps_left: u32,
+    /// The motion that sets the target in each step, if it is longer than the horizon or has several points. A keyframe
+    /// has it behind its other fields.
+    #[serde(skip)]
+    pub(crate) motion: Option<Motion>,
+}
+
+impl ActiveGrab {
+    /// The grab as a keyframe has it.
+    pub(crate) fn without_motion(&self) -> Self {
+        Self { motion: None, ..*self }
+    }
 }
 
 /// Target of a driven particle.
@@ -41,6 +57,16 @@ pub(crate) fn drive_grabbed(
     }
 }
 
+/// Sets the targets for the step that ends as `scene_step`.
+pub(crate) fn begin_grabs(grabs: &mut [ActiveGrab], scene_step: u64, horizon: u32) {
+    for grab in grabs {
+        if let Some(motion) = &grab.motion {
+            let (target, steps) = motion.aim(scene_step, horizon);
+            (grab.target, grab.steps_left) = (target.to_array(), steps);
+        }
+    }
+}
+
 /// Counts a step of every grab.
 pub(crate) fn count_step(grabs: &mut [ActiveGrab]) {
     for grab in grabs {
@@ -56,8 +82,8 @@ pub(crate) fn drive_towards(
     reach: f32,
 ) {
     let position = store.position(location);
-    // The count is exact up to 2^24 substeps. A grab lasts at most 0.25 s of 10^5 steps of 10^3
-    // substeps, where its rounding changes the share by less than the rounding of the path.
+    // The count is exact up to 2^24 substeps. A target is at most 0.25 s of 10^5 steps of 10^3
+    // substeps away, where its rounding changes the share by less than the rounding of the path.
     let share =
         |axis: usize| (target.position[axis] - position[axis]) / target.substeps_left as f32;
     let path = [share(0), share(1), share(2)];

@@ -14,6 +14,7 @@ mod contacts;
 mod forces;
 mod hardening;
 mod motion;
+mod motions;
 mod order;
 mod parameters;
 mod surfaces;

@@ -83,8 +83,9 @@ fn surfaces_are_part_of_a_keyframe_and_a_reset_restores_them() {
     step(&mut original, 50);
     assert_eq!(copy.state_hash(), original.state_hash());
 
-    // In a keyframe of version 4, colliders have the surfaces of the scene: 1 byte for their number, and 8 each.
-    let mut older = encoded[..encoded.len() - 17].to_vec();
+    // In a keyframe of version 4, colliders have the surfaces of the scene: 1 byte for their number, 8 each, and 3 for
+    // no motions.
+    let mut older = encoded[..encoded.len() - 20].to_vec();
     older[..4].copy_from_slice(&4_u32.to_le_bytes());
     copy.restore(&particles(&original), &Keyframe::decode(&older).unwrap()).unwrap();
     assert_eq!(surfaces(&copy), [(0.25, 0.0), (0.5, 0.125)]);
@@ -94,8 +95,8 @@ fn surfaces_are_part_of_a_keyframe_and_a_reset_restores_them() {
     let other = Solver::new(&curtain);
     assert!(copy.restore(&particles(&other), &original.keyframe()).is_err());
     let mut damaged = encoded.clone();
-    let last = damaged.len() - 4;
-    damaged[last..].copy_from_slice(&1.5_f32.to_le_bytes());
+    let last = damaged.len() - 7;
+    damaged[last..last + 4].copy_from_slice(&1.5_f32.to_le_bytes());
     let damaged = Keyframe::decode(&damaged).unwrap();
     assert!(copy.restore(&particles(&original), &damaged).is_err(), "a restitution above 1");
 

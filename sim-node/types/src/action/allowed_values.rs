@@ -76,6 +76,9 @@ impl Action {
             Self::DriveBody { .. } => Some(
                 "the collider is no body; the scene makes it one with body = { mass, inertia }",
             ),
+            Self::Follow { append: true, .. } => Some(
+                "no motion is under way that could go on; send its first points without append",
+            ),
             Self::Pin { .. }
             | Self::Unpin { .. }
             | Self::Grab { .. }
@@ -112,7 +115,7 @@ impl Action {
                 return Some(format!("{values}{work}{kind}{block}{collider}"));
             }
             Self::Grab { .. } | Self::Move { .. } => {
-                "coordinates within 1e7, z 0 in 2-D, over 0 to 0.25 s"
+                "coordinates within 1e7, z 0 in 2-D, over 0 to 3600 s"
             }
             Self::Push { .. } => {
                 "coordinates and delta within 1e7, z 0 in 2-D, radius 0 to 1e7, limit 0 or more"
@@ -122,15 +125,20 @@ impl Action {
                 "coordinates within 1e7, direction not 0; in 2-D, z of both ends 0"
             }
             Self::MoveAnchor { .. } => {
-                "coordinates within 1e7, rotation not 0; in 2-D, z 0 and a rotation about z"
+                "coordinates within 1e7, rotation not 0, over 0 to 3600 s; in 2-D, z 0 and a rotation about z"
             }
             Self::MoveCollider { .. } => {
-                "coordinates within 1e7, rotation not 0; in 2-D, z 0 and a rotation about z; for \
-                 bounds, no rotation"
+                "coordinates within 1e7, rotation not 0, over 0 to 3600 s; in 2-D, z 0 and a rotation about z; \
+                 for bounds, no rotation"
             }
             Self::DriveBody { .. } => {
                 "coordinates within 1e7, rotation not 0, velocity within 1e7 m/s and angular velocity within 1e4 rad/s, \
                  also after a step of the force and torque; in 2-D, z 0 and rotations about z"
+            }
+            Self::Follow { .. } => {
+                "points at ascending times from 0 to 3600 s, after those that they are appended to; coordinates \
+                 within 1e7, rotation not 0; in 2-D, z 0 and rotations about z; for bounds, no rotation; at most \
+                 2048 points of all motions of the scene on their way"
             }
             Self::Load { .. } => "a scene that the node can read; see its messages",
             Self::Step { .. } => "1 or more",

@@ -13,7 +13,7 @@ pub struct ActionFields {
 
 impl ActionFields {
     /// All kinds, in the order of their numbers on the wire.
-    pub const ALL: [Self; 22] = [
+    pub const ALL: [Self; 23] = [
         Self::new("pin", &["particle"], &[]),
         Self::new("unpin", &["particle"], &[]),
         Self::new("grab", &["particle", "target"], &["over_s"]),
@@ -27,8 +27,8 @@ impl ActionFields {
         Self::new("cut", &["constraint"], &[]),
         Self::new("cut_radius", &["center", "radius"], &[]),
         Self::new("cut_segment", &["from", "to", "direction"], &[]),
-        Self::new("move_anchor", &["anchor", "translation"], &["rotation"]),
-        Self::new("move_collider", &["collider", "translation"], &["rotation"]),
+        Self::new("move_anchor", &["anchor", "translation"], &["rotation", "over_s"]),
+        Self::new("move_collider", &["collider", "translation"], &["rotation", "over_s"]),
         Self::new("set", &["parameter", "value"], &["constraint_kind", "block", "collider"]),
         Self::new("load", &["scene"], &[]),
         Self::new("rewind", &[], &["to_step", "back_steps"]),
@@ -39,6 +39,7 @@ impl ActionFields {
             &["collider", "translation"],
             &["rotation", "velocity", "angular_velocity", "force", "torque"],
         ),
+        Self::new("follow", &["object", "object_index", "path"], &["append"]),
         Self::new("unknown", &["number"], &[]),
     ];
 

@@ -91,6 +91,35 @@ impl Visitor<'_> for PlainVisitor {
     }
 }
 
+/// `#[serde(with = "double")]` for an f64 field. A non-finite value is written as a string, like that of an f32.
+pub(crate) mod double {
+    use super::{Deserialize, Deserializer, PlainF32, Serialize, Serializer, to_f32};
+
+    /// A number, or the text of a non-finite one.
+    #[derive(Deserialize)]
+    #[serde(untagged)]
+    enum Double {
+        Finite(f64),
+        Other(PlainF32),
+    }
+
+    #[allow(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde requires")]
+    pub(crate) fn serialize<S: Serializer>(value: &f64, serializer: S) -> Result<S::Ok, S::Error> {
+        if value.is_finite() {
+            serializer.serialize_f64(*value)
+        } else {
+            PlainF32(to_f32(*value)).serialize(serializer)
+        }
+    }
+
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+        Ok(match Double::deserialize(deserializer)? {
+            Double::Finite(number) => number,
+            Double::Other(PlainF32(number)) => number.into(),
+        })
+    }
+}
+
 /// `#[serde(with = "number")]` for an f32 field.
 pub(crate) mod number {
     use super::{Deserialize, Deserializer, PlainF32, Serialize, Serializer};

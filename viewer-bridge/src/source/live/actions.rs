@@ -39,12 +39,12 @@ pub(super) fn actions(
         }
         Command::CutSegment { from, to, direction } => Action::CutSegment { from, to, direction },
         Command::CutRadius { center, radius } => Action::CutRadius { center, radius },
-        Command::MoveCollider { collider, translation, rotation } => {
-            Action::MoveCollider { collider, translation, rotation }
+        Command::MoveCollider { collider, translation, rotation, over_s } => {
+            Action::MoveCollider { collider, translation, rotation, over_s }
         }
         Command::DriveBody(drive) => drive.action(),
-        Command::MoveAnchor { anchor, translation, rotation } => {
-            Action::MoveAnchor { anchor, translation, rotation }
+        Command::MoveAnchor { anchor, translation, rotation, over_s } => {
+            Action::MoveAnchor { anchor, translation, rotation, over_s }
         }
         Command::Pause {} => Action::Pause,
         Command::Resume {} => Action::Resume,

@@ -239,8 +239,10 @@ fn in_plane(pose: Pose) -> Pose {
 
 fn move_to(object: Object, Pose { translation, rotation }: Pose) -> Action {
     match object {
-        Object::Collider(collider) => Action::MoveCollider { collider, translation, rotation },
-        Object::Anchor(anchor) => Action::MoveAnchor { anchor, translation, rotation },
+        Object::Collider(collider) => {
+            Action::MoveCollider { collider, translation, rotation, over_s: 0.0 }
+        }
+        Object::Anchor(anchor) => Action::MoveAnchor { anchor, translation, rotation, over_s: 0.0 },
     }
 }
 

@@ -11,6 +11,8 @@ const CENTER = { name: "center", form: "vector", example: "0 1 0" };
 const RADIUS = { name: "radius", form: "number", example: "0.2" };
 /** @type {Field[]} */
 const MOTION = [{ name: "target", form: "vector", example: "0 1 0" }, { name: "over_s", form: "number", example: "0.017", isOptional: true }];
+/** @type {Field} */
+const OVER = { name: "over_s", form: "number", example: "1", isOptional: true };
 /** @type {Field[]} */
 const POSE = [{ name: "translation", form: "vector", example: "0 0.1 0" }, { name: "rotation", form: "rotation", example: "0 0 0 1", isOptional: true }];
 /** @type {Field} */
@@ -27,8 +29,8 @@ export const COMMANDS = {
   cut: [{ name: "constraint", form: "index", example: "0" }],
   cut_radius: [CENTER, RADIUS],
   cut_segment: [{ name: "from", form: "vector", example: "-1 1 0" }, { name: "to", form: "vector", example: "1 1 0" }, { name: "direction", form: "vector", example: "0 0 1" }],
-  move_collider: [COLLIDER, ...POSE],
-  move_anchor: [{ name: "anchor", form: "index", example: "0" }, ...POSE],
+  move_collider: [COLLIDER, ...POSE, OVER],
+  move_anchor: [{ name: "anchor", form: "index", example: "0" }, ...POSE, OVER],
   drive_body: [COLLIDER, ...POSE, ...["velocity", "angular_velocity", "force", "torque"].map((name) => (/** @type {Field} */ ({ name, form: "vector", example: "0 0 0", isOptional: true })))],
   set: [{ name: "parameter", form: "text", example: "damping" }, { name: "value", form: "value", example: "0.5" }, { name: "constraint_kind", form: "text", example: "structural", isOptional: true }, { name: "block", form: "index", example: "0", isOptional: true }, { ...COLLIDER, isOptional: true }],
   step: [{ name: "count", form: "count", example: "1" }],

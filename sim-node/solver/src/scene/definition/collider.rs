@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use sim_types::{ColliderFields, ColliderShape};
 
+use super::anchor::Waypoint;
 use super::decimal;
 
 /// A solid or mesh that particles bounce off and slide along.
@@ -25,12 +26,19 @@ pub struct SceneCollider {
     /// About the center of a box or mesh, in rad/s; 0 for all other shapes.
     #[serde(with = "decimal::vector", skip_serializing_if = "is_zero")]
     pub angular_velocity: [f32; 3],
+    /// Starts the path again when it ends.
+    #[serde(skip_serializing_if = "is_false")]
+    pub repeat: bool,
     /// The triangles of a mesh. All other shapes have none.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub mesh: Option<ColliderMesh>,
     /// The rigid body that another program moves.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub body: Option<ColliderBody>,
+    /// Poses over time, relative to the pose at load, in place of a velocity. The collider moves linearly between them,
+    /// and stands still before the first and after the last.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub path: Vec<Waypoint>,
 }
 
 /// Mass of a rigid body that another program moves. Its center of mass is the center of the collider.
@@ -67,7 +75,7 @@ fn is_zero(vector: &[f32; 3]) -> bool {
     *vector == [0.0; 3]
 }
 
-/// Decides whether to write the key of solids.
+/// Decides whether to write a key that is false by default.
 #[allow(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde requires")]
 fn is_false(value: &bool) -> bool {
     !*value

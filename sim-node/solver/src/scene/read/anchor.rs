@@ -50,7 +50,7 @@ impl FileAnchor {
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct FileWaypoint {
+pub(super) struct FileWaypoint {
     time: Option<Number>,
     translation: Option<Vector>,
     rotation: Option<Quaternion>,
@@ -86,16 +86,32 @@ impl Reader<'_> {
         }
         particles.sort_unstable();
         let path = self.path(&field("path"), &file.path)?;
-        let repeat = file.repeat.as_ref().is_some_and(|repeat| *repeat.get_ref());
-        if let Some(given) = file.repeat.as_ref().filter(|_| repeat && path.len() < 2) {
-            let problem = "a path of fewer than two points cannot repeat (allowed: false)";
-            return self.error(given.span(), &field("repeat"), problem);
-        }
+        let repeat = self.repeat(&field("repeat"), file.repeat.as_ref(), path.len())?;
         let origin = self.vector_or(&field("origin"), file.origin.as_ref(), [0.0; 3])?;
         Ok(SceneAnchor { particles, origin, repeat, path })
     }
 
-    fn path(&self, field: &str, file: &Tables<FileWaypoint>) -> Result<Vec<Waypoint>, SceneError> {
+    /// Returns whether a path of `point_count` points repeats.
+    pub(super) fn repeat(
+        &self,
+        field: &str,
+        repeat: Option<&Spanned<bool>>,
+        point_count: usize,
+    ) -> Result<bool, SceneError> {
+        let Some(given) = repeat.filter(|repeat| *repeat.get_ref()) else { return Ok(false) };
+        if point_count < 2 {
+            let problem = "a path of fewer than two points cannot repeat (allowed: false)";
+            return self.error(given.span(), field, problem);
+        }
+        Ok(true)
+    }
+
+    /// Checks the points of a path.
+    pub(super) fn path(
+        &self,
+        field: &str,
+        file: &Tables<FileWaypoint>,
+    ) -> Result<Vec<Waypoint>, SceneError> {
         let mut path: Vec<Waypoint> = Vec::with_capacity(file.len());
         for (index, table) in file.iter().enumerate() {
             let field = format!("{field}[{index}]");

@@ -5,15 +5,19 @@ use std::ops::Range;
 use serde::Deserialize;
 use sim_types::{ColliderShape, NumberRange};
 
+use super::anchor::FileWaypoint;
 use super::body::FileBody;
+use super::collider_path::ColliderPath;
 use super::mesh::MeshKeys;
 use super::reader::{ANGULAR_VELOCITY, Reader, SIZE};
 use super::value::{
-    Number, Quaternion, Spanned, Table, TableKeys, Vector, Word, append_elements, element_count,
+    Number, Quaternion, Spanned, Table, TableKeys, Tables, Vector, Word, append_elements,
+    element_count,
 };
 use crate::checks::is_near;
 use crate::contacts::mesh::collision_mesh::remove_slivers;
 use crate::contacts::mesh::inside::{SolidFlaw, find_flaw, remove_collapsed};
+use crate::scene::definition::anchor::Waypoint;
 use crate::scene::definition::collider::{ColliderGeometry, ColliderMesh, SceneCollider};
 use crate::scene::error::SceneError;
 use crate::scene::mesh::{Mesh, fan};
@@ -37,7 +41,9 @@ pub(super) struct FileCollider {
     b: Option<Vector>,
     min: Option<Vector>,
     max: Option<Vector>,
-    path: Option<Word>,
+    path: Option<Spanned<ColliderPath>>,
+    repeat: Option<Spanned<bool>>,
+    file: Option<Word>,
     vertices: Option<Spanned<Vec<Vector>>>,
     faces: Option<Spanned<Vec<Vec<i64>>>>,
     scale: Option<Number>,
@@ -61,6 +67,7 @@ fn keys(shape: ColliderShape) -> &'static [&'static str] {
         ColliderShape::Bounds => &["min", "max"],
         ColliderShape::Mesh => &[
             "path",
+            "file",
             "vertices",
             "faces",
             "scale",
@@ -88,11 +95,23 @@ impl FileCollider {
     pub(super) fn lists_size_bytes(&self) -> usize {
         let faces = self.faces.iter().flat_map(Spanned::get_ref);
         element_count(self.vertices.as_ref()) * size_of::<Vector>()
+            + self.points().map_or(0, |points| size_of_val(points.as_slice()))
             + faces.map(|face| size_of_val(face) + size_of_val(face.as_slice())).sum::<usize>()
     }
 
+    /// Returns the file of a mesh: `file`, or a text as `path`.
+    fn mesh_file(&self) -> Option<Word> {
+        let path = || self.path.as_ref().and_then(ColliderPath::file);
+        self.file.as_ref().map(|file| file.with(file.get_ref().clone())).or_else(path)
+    }
+
+    /// Returns the points in time.
+    fn points(&self) -> Option<&Tables<FileWaypoint>> {
+        self.path.as_ref().and_then(ColliderPath::points)
+    }
+
     /// Returns the places of the keys that belong to single shapes.
-    fn shape_keys(&self) -> [(&'static str, Option<Range<usize>>); 18] {
+    fn shape_keys(&self) -> [(&'static str, Option<Range<usize>>); 19] {
         fn span<T>(value: Option<&Spanned<T>>) -> Option<Range<usize>> {
             value.map(Spanned::span)
         }
@@ -108,7 +127,8 @@ impl FileCollider {
             ("b", span(self.b.as_ref())),
             ("min", span(self.min.as_ref())),
             ("max", span(self.max.as_ref())),
-            ("path", span(self.path.as_ref())),
+            ("path", span(self.path.as_ref()).filter(|_| self.points().is_none())),
+            ("file", span(self.file.as_ref())),
             ("vertices", span(self.vertices.as_ref())),
             ("faces", span(self.faces.as_ref())),
             ("scale", span(self.scale.as_ref())),
@@ -136,7 +156,12 @@ impl Reader<'_> {
         let is_mesh = matches!(shape, ColliderGeometry::Mesh { .. });
         let body = file.body.as_ref().map(|table| self.body(&field, table)).transpose()?;
         if body.is_some() {
-            self.refuse_motion(&field, file)?;
+            self.refuse_motion(&field, file, "a body has no motion of its own")?;
+        }
+        let path = self.collider_path(&field, file)?;
+        if let Some(given) = file.path.as_ref().filter(|_| body.is_some() && !path.is_empty()) {
+            let problem = "a body has no motion of its own (allowed: no points)";
+            return self.error(given.span(), &field("path"), problem);
         }
         Ok(SceneCollider {
             shape,
@@ -146,14 +171,40 @@ impl Reader<'_> {
             angular_velocity: self.angular_velocity(&field, file.angular_velocity.as_ref())?,
             mesh: is_mesh.then(|| fields.mesh()).transpose()?,
             body,
+            repeat: self.repeat(&field("repeat"), file.repeat.as_ref(), path.len())?,
+            path,
         })
     }
 
-    /// Refuses a velocity of a body, which its commands move.
+    /// Returns the points of a path, which takes the place of a velocity. Bounds do not rotate.
+    fn collider_path(
+        &self,
+        field: &impl Fn(&str) -> String,
+        file: &FileCollider,
+    ) -> Result<Vec<Waypoint>, SceneError> {
+        let Some(points) = file.points() else { return Ok(Vec::new()) };
+        let path = self.path(&field("path"), points)?;
+        self.refuse_motion(field, file, "a collider with a path has no velocity beside it")?;
+        let is_bounds = file
+            .shape
+            .as_ref()
+            .is_some_and(|shape| shape.get_ref() == ColliderShape::Bounds.name());
+        let is_turned = |point: &Waypoint| point.rotation[..3] != [0.0; 3];
+        let turned = path.iter().position(is_turned).filter(|_| is_bounds);
+        if let Some(index) = turned {
+            let (key, span) = (format!("path[{index}].rotation"), points[index].span());
+            let problem = "bounds do not rotate (allowed: [0, 0, 0, 1])";
+            return self.error(span, &field(&key), problem);
+        }
+        Ok(path)
+    }
+
+    /// Refuses a velocity, for the reason given.
     fn refuse_motion(
         &self,
         field: &impl Fn(&str) -> String,
         file: &FileCollider,
+        reason: &str,
     ) -> Result<(), SceneError> {
         let keys = [("velocity", &file.velocity), ("angular_velocity", &file.angular_velocity)];
         for (key, value) in keys {
@@ -161,7 +212,7 @@ impl Reader<'_> {
                 .as_ref()
                 .filter(|value| value.get_ref().iter().any(|number| *number.get_ref() != 0.0));
             if let Some(value) = moving {
-                let problem = "a body has no motion of its own (allowed: [0, 0, 0])";
+                let problem = format!("{reason} (allowed: [0, 0, 0])");
                 return self.error(value.span(), &field(key), problem);
             }
         }
@@ -250,12 +301,18 @@ impl<F: Fn(&str) -> String> ColliderFields<'_, '_, F> {
     /// Returns the triangles of a mesh, scaled and without slivers.
     fn mesh(&self) -> Result<ColliderMesh, SceneError> {
         let (file, reader) = (self.file, self.reader);
+        if let Some(path) = file.path.as_ref().filter(|_| file.file.is_some())
+            && file.points().is_none()
+        {
+            let problem = "the mesh has a file already (allowed: a list of points in time)";
+            return reader.error(path.span(), &(self.field)("path"), problem);
+        }
         let mesh = reader.mesh(&MeshKeys {
-            path: file.path.as_ref(),
+            path: file.mesh_file().as_ref(),
             vertices: file.vertices.as_ref(),
             faces: file.faces.as_ref(),
             span: self.span.clone(),
-            field: &|key| (self.field)(key),
+            field: &|key| self.mesh_field(key),
             parse: Mesh::surface_from_obj,
         })?;
         let scale = file.scale.as_ref();
@@ -319,8 +376,7 @@ impl<F: Fn(&str) -> String> ColliderFields<'_, '_, F> {
             None => return Ok(()),
         };
         let file = self.file;
-        let path =
-            file.path.as_ref().map(|path| format!("{}: ", path.get_ref())).unwrap_or_default();
+        let path = file.mesh_file().map(|path| format!("{}: ", path.get_ref())).unwrap_or_default();
         let problem = format!(
             "{path}{problem} (allowed: false, or a closed mesh of consistent winding; vertices at the same position \
              are one)"
@@ -329,12 +385,18 @@ impl<F: Fn(&str) -> String> ColliderFields<'_, '_, F> {
         self.reader.error(span, &(self.field)("solid"), problem)
     }
 
+    /// The field of a key of a mesh, whose path can also have the key `file`.
+    fn mesh_field(&self, key: &str) -> String {
+        let has_file = key == "path" && self.file.file.is_some();
+        (self.field)(if has_file { "file" } else { key })
+    }
+
     /// Reports a wrong mesh at its path, or at a key of a mesh that is written out.
     fn wrong_mesh<T>(&self, key: &str, problem: String) -> Result<T, SceneError> {
         let file = self.file;
-        if let Some(path) = &file.path {
+        if let Some(path) = file.mesh_file() {
             let problem = format!("{}: its {key} {problem}", path.get_ref());
-            return self.reader.error(path.span(), &(self.field)("path"), problem);
+            return self.reader.error(path.span(), &self.mesh_field("path"), problem);
         }
         let place = match key {
             "vertices" => file.vertices.as_ref().map(Spanned::span),

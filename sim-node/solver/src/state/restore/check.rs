@@ -6,10 +6,14 @@ use super::{RestoreError, is_held};
 use crate::checks::is_near;
 use crate::constraints::tethers::{TetherBasis, is_root};
 use crate::frame::{Frame, Pose};
+use crate::motion::{MOTION_POINTS_MAX, MotionState};
 use crate::solver::Solver;
-use crate::state::keyframe::{Keyframe, Moved};
+use crate::state::keyframe::{Keyframe, Motions, Moved};
 use crate::state::particles::Particle;
-use crate::step::drive::GRAB_OVER_S_MAX;
+use crate::step::drive::GRAB_HORIZON_S;
+
+/// Latest time of a motion, in steps: an hour at the highest rate.
+const MOTION_STEPS_MAX: f64 = 3600.0 * 1e5;
 
 /// Latest step of a scene. Up to it, f64 counts steps exactly.
 const SCENE_STEP_MAX: u64 = 1 << 53;
@@ -126,7 +130,47 @@ impl Solver {
                 return Err("bounds are rotated");
             }
         }
+        self.check_motions(keyframe)?;
         self.check_grabs_and_counters(keyframe)
+    }
+
+    fn check_motions(&self, keyframe: &Keyframe) -> Result<(), &'static str> {
+        let Motions { grabs, anchors, colliders } = &keyframe.motions;
+        let particles: Vec<_> = keyframe.grabs.iter().map(|grab| grab.particle).collect();
+        let moved = |all: &[Moved]| all.iter().map(|one| one.index).collect::<Vec<_>>();
+        let is_among = |motions: &[MotionState], owners: &[u32]| {
+            let mut owners = owners.iter();
+            motions.iter().all(|motion| owners.any(|owner| *owner == motion.index))
+        };
+        if !is_among(grabs, &particles)
+            || !is_among(anchors, &moved(&keyframe.moved_anchors))
+            || !is_among(colliders, &moved(&keyframe.moved_colliders))
+        {
+            return Err("a motion belongs to nothing that is grabbed or moved");
+        }
+        let count: usize = keyframe.motions.all().map(|motion| motion.points().len()).sum();
+        if count > MOTION_POINTS_MAX {
+            return Err("its motions have too many points");
+        }
+        for motion in keyframe.motions.all() {
+            let times: Vec<_> = motion.points().map(|(time, _)| time).collect();
+            let is_ascending = times.windows(2).all(|pair| pair[0] < pair[1]);
+            let is_time = |time: &f64| (0.0..=MOTION_STEPS_MAX).contains(time);
+            if times.is_empty() || !is_ascending || !times.iter().all(is_time) {
+                return Err("a time of a motion is out of range");
+            }
+            let is_frame = |(_, pose): (f64, Pose)| {
+                Frame::check(&pose, self.context()).is_ok_and(|_| is_unit(&pose))
+            };
+            if !motion.points().all(is_frame) {
+                return Err("a point of a motion is out of range");
+            }
+        }
+        let bounds = |motion: &&MotionState| {
+            let collider = &self.colliders[motion.index as usize];
+            motion.points().any(|(_, pose)| !collider.accepts(&Frame::from_pose(&pose)))
+        };
+        if colliders.iter().find(bounds).is_some() { Err("bounds are rotated") } else { Ok(()) }
     }
 
     fn check_moved(&self, all: &[Moved], count: usize) -> Result<(), &'static str> {
@@ -136,7 +180,7 @@ impl Solver {
         }
         let is_frame = |moved: &Moved| {
             let pose = Pose { translation: moved.translation, rotation: moved.rotation };
-            Frame::check(&pose, self.context()).is_ok() && moved.frame().is_unit()
+            Frame::check(&pose, self.context()).is_ok() && is_unit(&pose)
         };
         if all.iter().all(is_frame) {
             Ok(())
@@ -146,7 +190,7 @@ impl Solver {
     }
 
     fn check_grabs_and_counters(&self, keyframe: &Keyframe) -> Result<(), &'static str> {
-        let steps_max = self.grab_steps(GRAB_OVER_S_MAX);
+        let steps_max = self.grab_steps(GRAB_HORIZON_S);
         if keyframe.grabs.iter().any(|grab| grab.steps_left > steps_max) {
             return Err("a grab exceeds the longest duration");
         }
@@ -186,6 +230,12 @@ impl Solver {
         }
         Ok(())
     }
+}
+
+/// True if the rotation is a unit quaternion, up to rounding.
+fn is_unit(pose: &Pose) -> bool {
+    let square: f32 = pose.rotation.iter().map(|part| part * part).sum();
+    (square - 1.0).abs() < 1e-5
 }
 
 /// True if the indices ascend strictly, all below a limit.
