@@ -19,6 +19,6 @@ pub use recording::{RecordingState, RecordingText};
 pub use refusal::Refusal;
 pub use timeline::{Hashes, HistoryText, Mark, MarkKind, Playback, Timeline, Toward};
 pub use to_page::{
-    ColliderSurface, Level, Mode, Node, NodeState, OutcomeText, PageLimits, ParametersText, Status,
-    ToPage, Undoable, Welcome,
+    Level, Mode, Node, NodeState, OutcomeText, PageLimits, ParametersText, Status, ToPage,
+    Undoable, Welcome,
 };

@@ -10,6 +10,7 @@ use super::refusal::Refusal;
 use super::timeline::{HistoryText, Playback, Timeline};
 use crate::limits;
 use crate::scene::catalog::SceneEntry;
+use crate::scene::summary::ColliderSurface;
 
 /// A message to a page.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -181,15 +182,6 @@ pub struct ParametersText {
     pub initial: Option<ParameterValues>,
     /// Friction and restitution of each collider in the scene. COLLIDERS has the present ones.
     pub initial_colliders: Vec<ColliderSurface>,
-}
-
-/// Friction and restitution of a collider.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct ColliderSurface {
-    /// Coulomb's coefficient.
-    pub friction: f32,
-    /// Fraction of the approach speed with which a particle bounces.
-    pub restitution: f32,
 }
 
 impl ParametersText {

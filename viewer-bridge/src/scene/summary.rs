@@ -2,13 +2,22 @@
 
 use std::ops::Range;
 
+use serde::Serialize;
 use sim_contract::ParameterValues;
 use sim_solver::Scene;
 use sim_solver::scene::{ColliderMeshes, SceneCollider, ScenePoses, Shape, Up};
 
 use crate::limits::SHAPES_MAX;
-use crate::message::ColliderSurface;
 use crate::wire::ShapeText;
+
+/// Friction and restitution of a collider.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ColliderSurface {
+    /// Coulomb's coefficient.
+    pub friction: f32,
+    /// Fraction of the approach speed with which a particle bounces.
+    pub restitution: f32,
+}
 
 /// The part of a scene that a viewer needs.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,11 +3,12 @@
 use serde_json::{Value, json};
 use sim_contract::{ParameterValues, Reason};
 use viewer_bridge::message::{
-    Choice, ColliderSurface, FromPage, GhostState, GhostText, Hashes, HistoryText, Level, Mark,
-    MarkKind, Mode, Node, NodeState, OutcomeText, PageLimits, ParametersText, Playback,
-    RecordingState, RecordingText, Refusal, Status, Timeline, ToPage, Undoable, Welcome,
+    Choice, FromPage, GhostState, GhostText, Hashes, HistoryText, Level, Mark, MarkKind, Mode,
+    Node, NodeState, OutcomeText, PageLimits, ParametersText, Playback, RecordingState,
+    RecordingText, Refusal, Status, Timeline, ToPage, Undoable, Welcome,
 };
 use viewer_bridge::scene::catalog::Catalog;
+use viewer_bridge::scene::summary::ColliderSurface;
 
 use super::check;
 
