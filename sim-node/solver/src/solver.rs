@@ -37,6 +37,7 @@ use crate::store::{Configured, ParticleStore, SceneFields};
 /// [`Self::step`] allocates nothing, except after commands that change parameters or, in scenes with
 /// tethers, what holds a particle.
 #[derive(Debug, Clone)]
+#[allow(clippy::struct_excessive_bools, reason = "independent facts, not the states of a machine")]
 pub struct Solver {
     /// Particles as loaded, constraints by index, triangles. Immutable until the next load.
     pub(crate) model: Arc<Model>,

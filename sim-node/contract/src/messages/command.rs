@@ -157,6 +157,7 @@ impl Command {
     }
 
     /// Encodes an action; the sender is 0.
+    #[allow(clippy::too_many_lines, reason = "an arm for each action")]
     fn from_action(action: Action) -> Self {
         match action {
             Action::Pin { particle } => Self::with_kind(kind::PIN, particle),

@@ -47,9 +47,9 @@ impl Folds {
         for _ in 0..SEARCH_ROUNDS {
             let middle = f64::midpoint(low, high);
             if width(middle) * f64::from(self.fullness) > flat {
-                low = middle
+                low = middle;
             } else {
-                high = middle
+                high = middle;
             }
         }
         low

@@ -15,7 +15,7 @@ use crate::scene::read::settings::FileSolver;
 use crate::scene::read::wind::FileWind;
 
 /// Returns the advice for an unknown key: a similar key of this table, the tables that have the key, or a
-/// similar key of another table. Empty if there is none of these.
+/// similar key of another table. Empty without such a key.
 pub(super) fn advice<'a>(key: &str, allowed: impl IntoIterator<Item = &'a str>) -> String {
     let similar = did_you_mean(key, allowed);
     if !similar.is_empty() {
