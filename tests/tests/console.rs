@@ -39,7 +39,7 @@ fn a_rejection_names_the_remedy() {
     for (command, expected) in [
         ("cut 4000000000", last_constraint.as_str()),
         ("move-anchor 7 0 0 0", "unknown_anchor: the scene has no such anchor (it has none)"),
-        ("move-collider 0 0 0 0", "unknown_collider: the scene has no such collider (it has none)"),
+        ("move-collider 7 0 0 0", "unknown_collider: the scene has no such collider (allowed: 0)"),
         ("release 3", "not_grabbed: the particle is not grabbed (`ctl grab` grabs it)"),
         (
             "set tear_force inf",

@@ -66,7 +66,9 @@ pub(crate) fn warn_incomplete(path: &Path, end: &LogEnd, done: &str) {
 
 /// Warns about a name by which other programs, and `viewer-bridge`, do not find a recording.
 pub(crate) fn warn_of_extension(path: &Path) {
-    if path.extension().is_none_or(|extension| !extension.eq_ignore_ascii_case("mcap")) {
+    // What is no file is refused later, which says enough.
+    let is_other = std::fs::metadata(path).is_ok_and(|found| !found.is_file());
+    if !is_other && path.extension().is_none_or(|one| !one.eq_ignore_ascii_case("mcap")) {
         note(&format!(
             "warning: programs expect a recording to end in .mcap, unlike {}",
             path_text(path)

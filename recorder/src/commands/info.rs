@@ -58,9 +58,9 @@ pub(crate) fn run(args: &InfoArgs) -> anyhow::Result<Exit> {
     let path = output::path_text(&args.file);
     let stop = Stop::install()?;
     let open = || LogReader::open_until(&args.file, &stop);
+    let mut log = open().with_context(|| path.clone())?;
     let size_bytes = fs::metadata(&args.file).with_context(|| path.clone())?.len();
-    let inspected = open().map_err(anyhow::Error::from);
-    let inspected = inspected.and_then(|mut log| inspect(&mut log, path.clone(), size_bytes));
+    let inspected = inspect(&mut log, path.clone(), size_bytes);
     let (mut info, end) = inspected.with_context(|| path.clone())?;
     let saves_more = |parts: &IntactParts| parts.snapshot_count() > info.snapshot_count;
     let parts = intact_parts(&args.file, &end, &stop, saves_more)?;

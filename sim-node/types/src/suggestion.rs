@@ -20,10 +20,7 @@ pub fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
             || whole.strip_suffix(&word).is_some_and(|rest| rest.ends_with('-'))
     };
     let of_part = || known.iter().find(|(plain, _)| is_part(plain)).map(|(_, one)| *one);
-    typed
-        .filter(|(distance, _)| *distance <= length / 3)
-        .map(|(_, one)| one)
-        .or_else(of_part)
+    typed.filter(|(distance, _)| *distance <= length / 3).map(|(_, one)| one).or_else(of_part)
 }
 
 /// Returns ` (did you mean 'x'?)` with the [`nearest`] word, or an empty text.

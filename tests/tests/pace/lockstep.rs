@@ -388,7 +388,7 @@ fn a_recording_and_a_watch_name_each_member_that_joins_leaves_or_is_dropped() {
     let last: Vec<_> = kinds(9).collect();
     assert!(last.starts_with(&["joined", "timed_out"]), "{last:?}");
     assert!(last.ends_with(&["joined", "left"]), "{last:?}");
-    let verified = Process::run(Program::Recorder, &sandbox, &["verify", &file]).success();
+    let verified = Process::run(Program::Recorder, &sandbox, &["verify", "-v", &file]).success();
     assert!(verified.contains("the members of the lockstep in /events"), "{verified}");
     killed.wait();
     watch.interrupt();

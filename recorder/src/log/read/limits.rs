@@ -3,6 +3,8 @@
 //! A length in a file is a claim. A reader compares it with the most that the scene of the file can
 //! need before it allocates, so that a damaged or hostile file costs no more memory than a valid one.
 
+use sim_solver::MOTION_POINTS_MAX;
+
 use crate::log::run::RunDescription;
 use crate::log::topic::Topic;
 
@@ -70,7 +72,10 @@ impl SizeLimits {
             // has at least 32 bytes in the scene.
             Topic::Forces => 96 * particle_count + 16 * scene_size_bytes,
             // The same bounds as `Solver::keyframe_size_bytes_max`.
-            Topic::Keyframe => 64 * particle_count + 16 * constraint_count + 2 * scene_size_bytes,
+            Topic::Keyframe => {
+                let motions = 64 * MOTION_POINTS_MAX as u64;
+                motions + 64 * particle_count + 16 * constraint_count + 2 * scene_size_bytes
+            }
             Topic::Particles => 32 * particle_count,
             // A generated block has at least 30 bytes in the scene, and at most 60 here.
             Topic::Parameters => 2 * scene_size_bytes,

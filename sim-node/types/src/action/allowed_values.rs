@@ -193,13 +193,8 @@ mod tests {
     fn a_misspelt_parameter_is_answered_with_the_nearest_one() {
         let parameter = Text::cut("gravty");
         let value = ParameterValue::Number(1.0);
-        let action = Action::Set {
-            parameter,
-            value,
-            constraint_kind: None,
-            block: None,
-            collider: None,
-        };
+        let action =
+            Action::Set { parameter, value, constraint_kind: None, block: None, collider: None };
         let values = action.allowed_values(Reason::UnknownParameter).unwrap();
         assert!(values.starts_with("gravity, damping, "), "{values}");
         assert!(values.ends_with("; did you mean 'gravity'?"), "{values}");
