@@ -55,7 +55,10 @@ enum SharedRunning {
 impl SharedRunning {
     fn with<R>(&self, call: impl FnOnce(&mut Running) -> PyResult<R>) -> PyResult<R> {
         match self {
-            Self::Alone(running) => call(&mut whole(running, "simulation")?),
+            Self::Alone(running) => {
+                let mut running = whole(running, "simulation")?;
+                call(&mut running)
+            }
             Self::OfProcess(running) => running.with(call),
         }
     }
