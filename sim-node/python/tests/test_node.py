@@ -100,8 +100,7 @@ def test_everything_that_a_node_publishes_can_be_read(start_node: StartNode) -> 
     assert simulation.topology().scene_hash == topology.scene_hash
     assert node.parameters() == simulation.parameters()
     assert node.status()["particle_count"] == len(snapshot)
-    (collider,) = node.colliders()
-    assert collider["shape"] == "box"
+    assert [collider["shape"] for collider in node.colliders()] == ["box", "plane"]
     assert node.torn().tolist() == [5]
 
 

@@ -42,7 +42,7 @@ fn the_page_opens_on_something_that_moves_with_a_hint_until_it_is_touched() {
 #[test]
 #[ignore = "needs Chromium"]
 fn every_scene_is_loaded_by_keys_and_from_the_menu_at_its_own_rate() {
-    let mut rig = Rig::new(&["curtain"], "");
+    let mut rig = Rig::new(&["drape"], "");
     let catalog = Catalog::default();
     let scenes = catalog.entries();
     let shown = |name: &str| format!("viewer.scene === '{name}' && viewer.frame >= 0");
@@ -80,7 +80,7 @@ fn every_scene_is_loaded_by_keys_and_from_the_menu_at_its_own_rate() {
 #[test]
 #[ignore = "needs Chromium"]
 fn quick_presses_of_the_key_for_the_next_scene_end_at_the_last_one_without_a_complaint() {
-    let rig = Rig::new(&["curtain"], "");
+    let rig = Rig::new(&["drape"], "");
     let catalog = Catalog::default();
     // Some of the scenes before it have another rate, so that their loads begin other runs.
     let last = &catalog.entries()[6].name;

@@ -81,6 +81,6 @@ fn two_pages_share_one_simulation() {
     rig.tab.wait(&is_grabbed);
     rig.tab.release(at);
     other.wait(&format!("!{is_grabbed}"));
-    other.key('2');
+    other.load_by_digit('3', "rope");
     rig.tab.wait("viewer.scene === 'rope' && viewer.frame >= 0");
 }

@@ -325,6 +325,13 @@ impl Tab {
         self.named_key("Enter");
     }
 
+    /// Goes to a scene of the menu by its digit, and loads it.
+    pub(crate) fn load_by_digit(&self, digit: char, scene: &str) {
+        self.key(digit);
+        self.wait(&format!("document.activeElement.dataset.scene === '{scene}'"));
+        self.evaluate("document.activeElement.click()");
+    }
+
     /// Presses the pause key, and waits until the page knows that the node is paused.
     pub(crate) fn pause(&self) {
         self.key(' ');
