@@ -210,6 +210,6 @@ fn the_architecture_names_files_that_exist_and_fits_a_sitting() {
         // its store.
         let folders = ["", "sim-node/solver/src", "sim-node/solver/src/store"];
         let is_file = |folder: &&str| root.join(folder).join(path).is_file();
-        assert!(folders.iter().any(|folder| is_file(folder)), "{path} does not exist");
+        assert!(folders.iter().any(is_file), "{path} does not exist");
     }
 }

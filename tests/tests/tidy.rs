@@ -209,8 +209,7 @@ fn is_unsafe(line: &str) -> bool {
 
 /// Returns the paths in the paragraph of ARCHITECTURE.md on unsafe code. Files come before their folder.
 fn listed_as_unsafe(architecture: &str) -> BTreeSet<PathBuf> {
-    let from =
-        architecture.split_once("`unsafe` code is in ").expect("the paragraph on unsafe code").1;
+    let from = architecture.split_once("`unsafe` code is in ").unwrap().1;
     let paragraph = from.split("\n\n").next().unwrap_or(from);
     let (mut paths, mut files) = (BTreeSet::new(), Vec::new());
     for span in paragraph.split('`').skip(1).step_by(2) {

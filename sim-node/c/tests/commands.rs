@@ -33,6 +33,7 @@ fn set(parameter: &str, value: ParameterValue) -> Action {
 const ZERO: [f32; 3] = [0.0; 3];
 
 #[test]
+#[allow(clippy::too_many_lines, reason = "a row for each function")]
 fn each_function_makes_the_command_of_its_name() {
     let (a, b, c) = (A.as_ptr(), B.as_ptr(), C.as_ptr());
     let push = |limit| Action::Push { center: A, radius: 0.1, delta: B, limit };

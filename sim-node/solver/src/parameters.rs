@@ -318,13 +318,14 @@ impl Parameters {
                 Target::Kind(kind) => self.softness[kind as usize] = number,
                 _ => self.softness = [number; 4],
             },
-            Parameter::Bending => match target {
-                Target::Block(block) => self.block_bending.set(block, number),
-                _ => {
+            Parameter::Bending => {
+                if let Target::Block(block) = target {
+                    self.block_bending.set(block, number);
+                } else {
                     self.bending = number;
                     self.block_bending.clear();
                 }
-            },
+            }
             Parameter::Friction => {
                 self.surfaces.set(target.collider(), |one| one.friction = or_zero);
             }

@@ -343,6 +343,7 @@ impl Action {
 
     /// Samples for tests of formats: one action of each kind, or several if it has options.
     #[doc(hidden)]
+    #[allow(clippy::too_many_lines, reason = "a sample of each action")]
     pub fn samples() -> Vec<Self> {
         use crate::constraint_kind::ConstraintKind;
 

@@ -58,8 +58,8 @@ fn the_picture_has_most_of_a_small_window_and_nothing_scrolls_out_of_it() {
     assert_eq!(rig.tab.evaluate(is_shown), false);
     rig.tab.click("#more");
     rig.tab.wait(is_shown);
-    let area = rig.tab.camera().area();
-    let at = [area.x + 20.0, area.y + area.height - 20.0];
+    let bottom = "document.querySelector('#stage').getBoundingClientRect().bottom";
+    let at = [20.0, rig.tab.number(bottom) - 20.0];
     rig.tab.press(at, Button::Left);
     rig.tab.release(at);
     rig.tab.wait(&format!("!{is_shown}"));

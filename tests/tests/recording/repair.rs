@@ -168,7 +168,7 @@ fn readers_see_of_a_damaged_file_what_its_repair_saves() {
     recorder(&sandbox, &args).success();
     let bytes = fs::read(&whole).unwrap();
     let middle = bytes.len() / 2;
-    let index = (middle..).find(|at| is_message_index(&bytes[*at..])).unwrap();
+    let index = (middle..bytes.len()).find(|at| is_message_index(&bytes[*at..])).unwrap();
     // The chunks begin after the scene.
     for (place, change) in [(20_000, 1), (middle, 1), (index + 6, 0x80)] {
         let mut bytes = bytes.clone();

@@ -17,6 +17,7 @@ const RATES: std::ops::RangeInclusive<f32> = 0.1..=10.0;
 ///
 /// # Errors
 /// A number is not finite or out of its range, or a vector has no direction.
+#[allow(clippy::too_many_lines, reason = "an arm for each command")]
 pub fn check(command: &Command) -> Result<(), Reason> {
     match command {
         Command::Grab { target, over_s, .. } | Command::Move { target, over_s, .. } => {

@@ -48,6 +48,7 @@ pub(crate) fn layouts() -> String {
     text
 }
 
+#[allow(clippy::too_many_lines, reason = "a line for each field")]
 fn write_state_layouts(text: &mut String) {
     layout!(text, ParticleState { position, inverse_mass, velocity, flags });
     layout!(
