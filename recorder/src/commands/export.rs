@@ -194,6 +194,10 @@ fn survey<R: Read>(args: &ExportArgs, log: LogReader<R>, path: &str) -> anyhow::
 }
 
 /// Writes the files and prints the result.
+#[allow(
+    clippy::too_many_arguments,
+    reason = "two readers of the same file, of states and of bytes"
+)]
 fn export<R: Read>(
     args: &ExportArgs,
     survey: &Survey,

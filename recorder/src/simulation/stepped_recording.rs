@@ -169,7 +169,7 @@ mod tests {
             }
             // It has no step.
             recording.add_command(301, Action::Reset, Ok(Applied::InPlace));
-            let bytes = recording.finish().and_then(|path| Ok(fs::read(path).unwrap())).unwrap();
+            let bytes = fs::read(recording.finish().unwrap()).unwrap();
             let timed = (1..).zip(commands).map(|(sequence, (step, action))| TimedCommand {
                 step: *step,
                 index: None,

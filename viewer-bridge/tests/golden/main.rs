@@ -214,6 +214,7 @@ fn part() -> Part {
 }
 
 /// The fields that a decoder must find.
+#[allow(clippy::too_many_lines, reason = "an arm for each message")]
 fn fields(message: &Message) -> Value {
     match message {
         Message::Scene(scene) => json!({

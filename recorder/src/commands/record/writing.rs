@@ -92,7 +92,7 @@ struct Files {
     open: Option<OpenFile>,
     next_number: u64,
     /// The files of the ring, oldest first. The last one is in progress.
-    ring_files: VecDeque<PathBuf>,
+    ring: VecDeque<PathBuf>,
     written: Written,
 }
 
@@ -112,9 +112,9 @@ impl Files {
         position: Arc<WritePosition>,
         created: Option<PartFile>,
     ) -> Self {
-        let ring_files = std::mem::take(&mut options.earlier).into();
+        let ring = std::mem::take(&mut options.earlier).into();
         let written = Written::default();
-        Self { options, position, created, open: None, next_number: 0, ring_files, written }
+        Self { options, position, created, open: None, next_number: 0, ring, written }
     }
 
     /// Writes every entry of the queue, and flushes at intervals.
@@ -207,10 +207,10 @@ impl Files {
     fn trim_ring(&mut self, number: u64) {
         let ring = self.options.ring;
         if ring.is_given() && !self.options.names.is_single() {
-            self.ring_files.push_back(self.options.names.path(number));
+            self.ring.push_back(self.options.names.path(number));
         }
         let count_max = ring.files_max.and_then(|count| usize::try_from(count).ok());
-        while self.ring_files.len() > count_max.unwrap_or(usize::MAX) {
+        while self.ring.len() > count_max.unwrap_or(usize::MAX) {
             self.remove_oldest();
         }
         self.keep_reserve();
@@ -228,8 +228,8 @@ impl Files {
             self.position.end_for_reserve();
             return;
         }
-        while self.ring_files.len() > 1 {
-            let path = output::path_text(&self.ring_files[0]);
+        while self.ring.len() > 1 {
+            let path = output::path_text(&self.ring[0]);
             output::note(&format!("removing {path}, because less than --min-free is free"));
             if self.remove_oldest() {
                 return;
@@ -240,7 +240,7 @@ impl Files {
     /// Removes the oldest file of the ring, unless another program has moved it. One that cannot be removed
     /// stays, because the newest data matter most. Returns `true` if a file was removed.
     fn remove_oldest(&mut self) -> bool {
-        let Some(path) = self.ring_files.pop_front() else { return false };
+        let Some(path) = self.ring.pop_front() else { return false };
         match fs::remove_file(&path) {
             Ok(()) => {
                 self.written.removed_count += 1;

@@ -180,7 +180,9 @@ mod tests {
                 assert_eq!(blocks.read(chain), state(*number, count), "{count}");
             }
             assert_eq!(blocks.read_bytes(&text, 100), bytes);
-            kept.into_iter().for_each(|(_, chain)| blocks.release(chain));
+            for (_, chain) in kept {
+                blocks.release(chain);
+            }
             blocks.release(text);
             assert_eq!(blocks.free_count(), all);
         }

@@ -162,7 +162,7 @@ fn loads_and_runs_while_the_disk_stalls_take_bounded_memory_and_are_declared() {
         Feed::new(Intake::default(), Arc::clone(&queue), Arc::default(), SplitArgs::default())
             .following(true);
     let mut node = Node::new();
-    node.load.scene.extend([b'#'; LIMIT_BYTES / 2]);
+    node.load.scene.extend(vec![b'#'; LIMIT_BYTES / 2]);
     for number in 0..LOADS {
         // Three runs, of which the last two begin while the disk stalls; a run has 100 loads and 50 outcomes.
         let (run, index) = (number / 100, number % 100);
@@ -191,7 +191,7 @@ fn what_no_file_declares_is_in_the_report() {
         Feed::new(Intake::default(), Arc::clone(&queue), Arc::default(), SplitArgs::default())
             .following(true);
     let mut node = Node::new();
-    node.load.scene.extend([b'#'; LIMIT_BYTES]);
+    node.load.scene.extend(vec![b'#'; LIMIT_BYTES]);
     for step in 0..10 {
         let topology_revision = u32::try_from(step).unwrap();
         feed_load(&mut feed, &mut node, SnapshotHeader { topology_revision, ..header(step, step) });
