@@ -58,8 +58,10 @@ fn the_picture_has_most_of_a_small_window_and_nothing_scrolls_out_of_it() {
     assert_eq!(rig.tab.evaluate(is_shown), false);
     rig.tab.click("#more");
     rig.tab.wait(is_shown);
-    let bottom = "document.querySelector('#stage').getBoundingClientRect().bottom";
-    let at = [20.0, rig.tab.number(bottom) - 20.0];
+    // Below the unfolded controls, and above the panel.
+    let free = "[...Array(innerHeight).keys()].findLast((y) => \
+         document.elementFromPoint(20, y)?.matches('#stage canvas'))";
+    let at = [20.0, rig.tab.number(free)];
     rig.tab.press(at, Button::Left);
     rig.tab.release(at);
     rig.tab.wait(&format!("!{is_shown}"));
