@@ -7,8 +7,8 @@ use pyo3::prelude::*;
 use sim_contract::{
     ConstraintKind, GRAB_OVER_S_DEFAULT, KindFilter, MovedObject, PathPoint, Text, read_scene_file,
 };
-use sim_solver::{MOTION_POINTS_MAX, Scene};
 use sim_solver::scene::is_path;
+use sim_solver::{MOTION_POINTS_MAX, Scene};
 
 use crate::arguments;
 use crate::convert::{Quaternion, Vector, from_json, parameter_value};
@@ -134,18 +134,14 @@ impl Action {
     /// Returns the actions that lead an object along points, each a list of 4 or 8 numbers.
     #[staticmethod]
     #[pyo3(signature = (object, index, path, append=false))]
-    fn follow(
-        object: &str,
-        index: u32,
-        path: Vec<Vec<f64>>,
-        append: bool,
-    ) -> PyResult<Vec<Self>> {
+    fn follow(object: &str, index: u32, path: Vec<Vec<f64>>, append: bool) -> PyResult<Vec<Self>> {
         let object = match object {
             "particle" => MovedObject::Particle,
             "anchor" => MovedObject::Anchor,
             "collider" => MovedObject::Collider,
             _ => {
-                let problem = format!("'{object}' cannot move (allowed: particle, anchor, collider)");
+                let problem =
+                    format!("'{object}' cannot move (allowed: particle, anchor, collider)");
                 return Err(PyValueError::new_err(problem));
             }
         };
