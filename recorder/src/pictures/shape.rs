@@ -121,7 +121,7 @@ impl Stroke {
 }
 
 impl Shape {
-    /// Returns `true` if all coordinates are finite and within [`COORDINATE_MAX`].
+    /// Returns `true` if all coordinates are finite and within `COORDINATE_MAX`.
     pub fn is_drawable(&self) -> bool {
         let is_near =
             |point: &DVec2| point.is_finite() && point.abs().max_element() < COORDINATE_MAX;
