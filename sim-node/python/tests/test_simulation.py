@@ -173,7 +173,7 @@ def test_the_friction_of_a_collider_changes_how_far_a_particle_slides(tmp_path: 
         friction = 0.5
         """)
 
-    def slid(**values: object) -> float:
+    def slid(**values: dict[int, float]) -> float:
         simulation = catenary.Simulation(scene)
         simulation.set(**values)
         simulation.step(240)
