@@ -38,6 +38,8 @@ pub const FRAMES_PER_SECOND_MAX: u32 = 60;
 /// Largest binary message in one piece, and size of the pieces of a longer one: half a second of a line of 1 Mbit/s. A
 /// multiple of four.
 pub const PART_SIZE_BYTES: usize = 64 << 10;
+/// Messages of a page that wait while it receives the pieces of a long one: what it may send at once after a pause.
+pub(crate) const ARRIVED_MAX: usize = MESSAGES_BURST_MAX as usize;
 /// Pieces that a page has not received. With one, the network latency would halve the rate.
 pub const PARTS_UNANSWERED_MAX: u32 = 2;
 /// Reliable messages that wait for one page. A page that lets more pile up is disconnected.

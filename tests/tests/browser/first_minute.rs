@@ -20,7 +20,7 @@ fn the_page_opens_on_something_that_moves_with_a_hint_until_it_is_touched() {
         rig.tab.evaluate("document.querySelector('#hint').textContent"),
         "Drag the cloth. Right-drag cuts it."
     );
-    // The hem is far from where it was before within a period of the gusts.
+    // The hem of the folds sways by 2 cm, half of a cell, within a period of the gusts.
     let first = rig.state().particles[HEM].position[2];
     rig.wait_for_state("the hem to sway", |state| {
         (state.particles[HEM].position[2] - first).abs() > 0.02

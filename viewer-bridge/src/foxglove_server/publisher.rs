@@ -31,7 +31,6 @@ const TOPICS: [Topic; 9] = [
     Topic::Steps,
     Topic::Particles,
 ];
-/// Number of the kind in [`Scene::kinds`].
 /// Time between two messages on `/scene`. Each is twice as large as the particles and encoded anew.
 const SCENE_PERIOD_NS: u64 = SECOND_NS / 10;
 /// Time after which `/scene` has everything again. A slow client may have missed the message with the meshes.

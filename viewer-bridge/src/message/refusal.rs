@@ -14,8 +14,10 @@ pub enum Refusal {
     Node(Reason),
     /// The node refused a value of this parameter.
     OutsideRange(Parameter),
-    /// The node refused a value or the block of this parameter, or a collider that it does not have.
+    /// The node refused a value or the block of this parameter.
     OutsideBlocks(Parameter),
+    /// The node refused a collider for this parameter, which belongs to no collider.
+    WithoutColliders(Parameter),
     /// The node gave a reason that this version does not know.
     Unknown,
     /// No node runs.
@@ -63,19 +65,19 @@ impl From<Reason> for Refusal {
 impl Refusal {
     /// The reason for which the node refused an action.
     pub(crate) fn of_action(reason: Reason, action: &Action) -> Self {
-        let parameter = match action {
-            Action::Set { parameter, block, collider, .. } => {
-                let has_part = |parameter: Parameter| {
-                    block.is_some() || (collider.is_some() && !parameter.info().is_per_collider)
-                };
-                let parameter = Parameter::from_name(parameter.as_str());
-                parameter.map(|parameter| (parameter, has_part(parameter)))
-            }
-            _ => None,
+        let Action::Set { parameter, block, collider, .. } = action else {
+            return Self::Node(reason);
         };
-        match (reason, parameter) {
-            (Reason::OutOfRange, Some((parameter, false))) => Self::OutsideRange(parameter),
-            (Reason::OutOfRange, Some((parameter, true))) => Self::OutsideBlocks(parameter),
+        match (reason, Parameter::from_name(parameter.as_str())) {
+            (Reason::OutOfRange, Some(parameter))
+                if collider.is_some() && !parameter.info().is_per_collider =>
+            {
+                Self::WithoutColliders(parameter)
+            }
+            (Reason::OutOfRange, Some(parameter)) if block.is_some() => {
+                Self::OutsideBlocks(parameter)
+            }
+            (Reason::OutOfRange, Some(parameter)) => Self::OutsideRange(parameter),
             _ => Self::Node(reason),
         }
     }
@@ -84,7 +86,9 @@ impl Refusal {
     pub fn name(self) -> &'static str {
         match self {
             Self::Node(reason) => reason.name(),
-            Self::OutsideRange(_) | Self::OutsideBlocks(_) => Reason::OutOfRange.name(),
+            Self::OutsideRange(_) | Self::OutsideBlocks(_) | Self::WithoutColliders(_) => {
+                Reason::OutOfRange.name()
+            }
             Self::Unknown => "unknown",
             Self::NoNode => "no_node",
             Self::NoAnswer => "no_answer",
@@ -122,8 +126,10 @@ impl Refusal {
                 return format!("{name} of a block accepts {range}, for a shape with bends").into();
             }
             Self::OutsideBlocks(parameter) => {
-                return format!("{} has no values for blocks or colliders", parameter.name())
-                    .into();
+                return format!("{} has no values for blocks", parameter.name()).into();
+            }
+            Self::WithoutColliders(parameter) => {
+                return format!("{} has no values for colliders", parameter.name()).into();
             }
             Self::Unknown => "the node gave an unknown reason",
             Self::NoNode => "no node is running; start one with `sim-node run`",
@@ -240,22 +246,18 @@ mod tests {
             Refusal::OutsideRange(Parameter::TearForce).text("set"),
             "tear_force accepts a number > 0"
         );
-        let of_block = |name: &str| {
+        let refused = |name: &str, block, collider| {
             let (parameter, value) = (Text::cut(name), ParameterValue::Number(1.0));
-            let set = Action::Set {
-                parameter,
-                value,
-                constraint_kind: None,
-                block: Some(7),
-                collider: None,
-            };
+            let set = Action::Set { parameter, value, constraint_kind: None, block, collider };
             Refusal::of_action(Reason::OutOfRange, &set).text("set")
         };
         assert_eq!(
-            of_block("bending"),
+            refused("bending", Some(7), None),
             "bending of a block accepts a number >= 0, for a shape with bends"
         );
-        assert_eq!(of_block("damping"), "damping has no values for blocks or colliders");
+        assert_eq!(refused("damping", Some(7), None), "damping has no values for blocks");
+        assert_eq!(refused("bending", None, Some(7)), "bending has no values for colliders");
+        assert_eq!(refused("restitution", None, Some(0)), "restitution accepts 0 to 1");
         assert!(Refusal::UnknownScene.text("load").contains("sim-node scenes"));
     }
 }

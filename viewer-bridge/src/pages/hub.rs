@@ -5,7 +5,7 @@
 //! it has credit. A frame is published after the messages that it depends on, and the task of a page
 //! empties its queue before it sends a frame. Therefore no frame arrives before its scene.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -79,6 +79,8 @@ struct Page {
     choice: Choice,
     credit: Arc<Credit>,
     wishes: Arc<Mutex<Wishes>>,
+    /// Latched messages that this page has missed, because its queue was half full.
+    missed: BTreeSet<Slot>,
 }
 
 impl HubState {
@@ -89,11 +91,18 @@ impl HubState {
     }
 
     /// Queues a message that is sent several times a second, for each page whose queue is not half full: a page that
-    /// receives a long scene over a slow line gets the next one.
-    fn queue_periodic(&mut self, message: &Message) {
-        self.pages.retain(|_, page| {
-            page.queue.capacity() < RELIABLE_QUEUED_MAX / 2
-                || page.queue.try_send(message.clone()).is_ok()
+    /// receives a long scene over a slow line gets the next one, and the newest of each latched message that it missed.
+    fn queue_periodic(&mut self, slot: Option<Slot>, message: &Message) {
+        let Self { pages, latched, .. } = self;
+        pages.retain(|_, page| {
+            if page.queue.capacity() < RELIABLE_QUEUED_MAX / 2 {
+                page.missed.extend(slot);
+                return true;
+            }
+            let missed = std::mem::take(&mut page.missed).into_iter();
+            let missed =
+                missed.filter(|one| Some(*one) != slot).filter_map(|one| latched.get(&one));
+            missed.chain([message]).all(|one| page.queue.try_send(one.clone()).is_ok())
         });
     }
 
@@ -105,7 +114,7 @@ impl HubState {
     /// Queues a message for each page and keeps it for later ones.
     fn latch(&mut self, slot: Slot, message: Message) {
         match slot {
-            Slot::History | Slot::Recording => self.queue_periodic(&message),
+            Slot::History | Slot::Recording => self.queue_periodic(Some(slot), &message),
             _ => self.queue(&message),
         }
         if slot == Slot::Scene {
@@ -257,7 +266,7 @@ impl Hub {
             frames_per_second: rate.frames_per_second,
             ..*statistics
         };
-        state.queue_periodic(&Message::Binary(statistics.encode()));
+        state.queue_periodic(None, &Message::Binary(statistics.encode()));
     }
 
     /// Sends a message to one page, if it is still there.
@@ -290,7 +299,8 @@ impl Hub {
         }
         let wishes = Arc::new(Mutex::new(Wishes::default()));
         let (seen_credit, seen_wishes) = (Arc::clone(&credit), Arc::clone(&wishes));
-        let page = Page { queue, choice, credit: seen_credit, wishes: seen_wishes };
+        let missed = BTreeSet::new();
+        let page = Page { queue, choice, credit: seen_credit, wishes: seen_wishes, missed };
         state.pages.insert(client, page);
         state.queue_count();
         drop(state);
@@ -394,5 +404,37 @@ impl Sink for Hub {
             // Pages receive the answers to their own commands, and statistics, and the topology in SCENE.
             Update::Topology(_) | Update::Status(_) => {}
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_page_that_was_busy_receives_the_newest_of_what_it_missed() {
+        let (queue, mut receiver) = mpsc::channel(RELIABLE_QUEUED_MAX);
+        let page = Page {
+            queue,
+            choice: Choice::default(),
+            credit: Arc::default(),
+            wishes: Arc::default(),
+            missed: BTreeSet::new(),
+        };
+        let pages = BTreeMap::from([(ClientId::Page(1), page)]);
+        let mut state = HubState { pages, ..HubState::default() };
+        let message = |text: &str| Message::Text(text.to_owned().into());
+        for _ in 0..=RELIABLE_QUEUED_MAX / 2 {
+            state.queue(&message("a scene"));
+        }
+        state.latch(Slot::Recording, message("running"));
+        state.queue_periodic(None, &message("statistics"));
+        state.latch(Slot::Recording, message("finished"));
+        let mut received = || std::iter::from_fn(|| receiver.try_recv().ok()).collect::<Vec<_>>();
+        assert_eq!(received(), vec![message("a scene"); RELIABLE_QUEUED_MAX / 2 + 1]);
+        state.queue_periodic(None, &message("statistics"));
+        assert_eq!(received(), ["finished", "statistics"].map(message));
+        state.queue_periodic(None, &message("statistics"));
+        assert_eq!(received(), ["statistics"].map(message));
     }
 }

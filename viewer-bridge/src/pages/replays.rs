@@ -81,7 +81,7 @@ impl Replays {
         let mut open = lock(&self.open);
         open.retain(|one| match one.shown.get() {
             Some(shown) => !shown.source.is_finished(),
-            // It could not be opened, unless a page is waiting for it.
+            // Without a page that waits for it, the opening has failed or was given up.
             None => is_held(one),
         });
         if let Some(known) = open.iter().find(|one| one.name == name) {

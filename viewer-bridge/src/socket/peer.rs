@@ -13,8 +13,8 @@ use tokio_tungstenite::tungstenite;
 
 use super::rate_limit::{Rate, RateLimit};
 use crate::limits::{
-    MESSAGE_SIZE_BYTES_MAX, MESSAGES_BURST_MAX, MESSAGES_PER_SECOND_MAX, PART_SIZE_BYTES,
-    PARTS_UNANSWERED_MAX, PING_PERIOD, SILENCE_MAX,
+    ARRIVED_MAX, MESSAGE_SIZE_BYTES_MAX, MESSAGES_BURST_MAX, MESSAGES_PER_SECOND_MAX,
+    PART_SIZE_BYTES, PARTS_UNANSWERED_MAX, PING_PERIOD, SILENCE_MAX,
 };
 use crate::wire::Part;
 
@@ -83,13 +83,22 @@ pub(crate) struct Peer {
     ping: Interval,
     /// The client puts long messages together from their pieces.
     takes_parts: bool,
-    /// Messages that have arrived while pieces were sent.
+    /// Messages that have arrived while pieces were sent, at most [`ARRIVED_MAX`].
     arrived: VecDeque<Message>,
+    /// Pieces sent. The ping behind a piece carries its number.
+    sent_parts: u64,
+    /// The newest piece whose ping the client has answered. A client may answer only the newest of several pings.
+    answered_parts: u64,
 }
 
 /// The end of a client that does not even answer a ping.
 fn silent() -> End {
     End::closed(TOO_SLOW, "the client does not answer")
+}
+
+/// The end of a client that sends more than it may.
+fn too_many() -> End {
+    End::closed(TOO_MANY_MESSAGES, "too many messages a second")
 }
 
 /// Sets the limits of a WebSocket before the upgrade.
@@ -113,6 +122,8 @@ impl Peer {
             ping,
             takes_parts: false,
             arrived: VecDeque::new(),
+            sent_parts: 0,
+            answered_parts: 0,
         }
     }
 
@@ -148,9 +159,15 @@ impl Peer {
         }
     }
 
-    /// Notes that something has arrived. Returns it, unless it is the end.
+    /// Notes that a message has arrived, and which piece it answers. Returns the message, or the end of the connection.
     fn checked(&mut self, incoming: Option<Result<Message, Error>>) -> Result<Message, End> {
         self.last_message_ns = monotonic_ns();
+        if let Some(Ok(Message::Pong(payload))) = &incoming
+            && let Ok(number) = payload.as_ref().try_into().map(u64::from_le_bytes)
+            && number <= self.sent_parts
+        {
+            self.answered_parts = self.answered_parts.max(number);
+        }
         match incoming {
             None | Some(Ok(Message::Close(_))) => Err(End::Gone),
             Some(Err(error)) => Err(End::from_error(error)),
@@ -163,7 +180,7 @@ impl Peer {
         if self.rate.count(1, self.last_message_ns).is_zero() {
             return Ok(());
         }
-        Err(End::closed(TOO_MANY_MESSAGES, "too many messages a second"))
+        Err(too_many())
     }
 
     /// Sends a message, a long one in pieces if the client takes them.
@@ -180,30 +197,28 @@ impl Peer {
     /// however slow the line is, it is alive, and its buffers stay short.
     async fn send_parts(&mut self, message: Bytes) -> Result<(), End> {
         let divided = spawn_blocking(move || Part::divide(&message)).await;
-        let mut unanswered = 0;
         for part in divided.map_err(|_| End::Gone)? {
             self.send_whole(Message::Binary(part.encode())).await?;
-            self.send_whole(Message::Ping(Bytes::new())).await?;
-            unanswered += 1;
-            while unanswered > PARTS_UNANSWERED_MAX {
-                unanswered -= u32::from(self.is_answered().await?);
+            self.sent_parts += 1;
+            let number = Bytes::copy_from_slice(&self.sent_parts.to_le_bytes());
+            self.send_whole(Message::Ping(number)).await?;
+            while self.sent_parts - self.answered_parts > u64::from(PARTS_UNANSWERED_MAX) {
+                self.await_answer().await?;
             }
         }
         Ok(())
     }
 
-    /// Waits for a message. Returns whether it answers a ping; others stay for `receive`.
-    async fn is_answered(&mut self) -> Result<bool, End> {
+    /// Waits for a message, which may answer a ping. Text and binary messages are kept for `receive`.
+    async fn await_answer(&mut self) -> Result<(), End> {
         let incoming = timeout(SILENCE_MAX, self.socket.recv()).await.map_err(|_| silent())?;
         match self.checked(incoming)? {
-            Message::Pong(_) => return Ok(true),
-            Message::Ping(_) => self.count()?,
-            message => {
-                self.count()?;
-                self.arrived.push_back(message);
-            }
+            Message::Pong(_) => return Ok(()),
+            Message::Ping(_) => {}
+            _ if self.arrived.len() == ARRIVED_MAX => return Err(too_many()),
+            message => self.arrived.push_back(message),
         }
-        Ok(false)
+        self.count()
     }
 
     /// Sends a message. A client that does not accept it within [`SILENCE_MAX`] is given up.

@@ -46,7 +46,7 @@ export function createViewer({ app, colorLegend, charts, connector, banner, inpu
     get arrows() { return renderer.arrowsDrawn.map(({ from, force, ...which }) => ({ ...which, from: [...from], force: [...force] })); },
     get unitsPerNewton() { return renderer.unitsPerNewton(); },
     /** The quantity that the colours show, the ends of the scale, and the extremes once they are known. */
-    get coloring() { return { ...renderer.coloring, ...colorLegend.scan.found }; },
+    get coloring() { return { ...colorLegend.scan.found, ...renderer.coloring }; },
     /** The plots in their order, with what each says now. */
     get plots() { return charts.plots.map(({ spec, output }) => ({ title: spec.title, text: output.textContent })); },
     get plotCursor() { return charts.cursor; },

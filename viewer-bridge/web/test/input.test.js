@@ -133,6 +133,8 @@ test("a timer that was held up waits for the release behind it", (context) => {
   now += 550;
   context.mock.timers.tick(550);
   assert.deepEqual(long.sent.map(({ type }) => type), ["pin"]);
+  long.listeners.get("pointerup")({ ...long.event, pointerType: "touch", type: "pointerup", timeStamp: now + 50 });
+  assert.deepEqual(long.selection.items, [], "the release selects nothing");
 });
 
 test("P pins what is selected, not what lies under the mouse, and unpins it if all of it is pinned", () => {

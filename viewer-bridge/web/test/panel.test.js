@@ -126,3 +126,12 @@ test("a scene with colliders has rows for their friction and restitution, with a
   const initial = withSurfaces({ damping: 1 }, [colliders[0], { ...colliders[1], friction: 0.75 }]);
   assert.deepEqual(restoring([row("friction"), row("restitution")], values, initial, []), { changes: [{ name: "friction", value: 0.75, part: "1" }], lost: [] });
 });
+
+test("the friction of a message equals that of the scene's text, and what all colliders share is restored at once", () => {
+  const ofText = [0, 1, 2].map((index) => ({ index, friction: 0.3, restitution: 0 }));
+  const ofMessage = (friction) => ofText.map((one) => ({ ...one, friction: Math.fround(friction) }));
+  const restored = (colliders) => restoring([row("friction")], withSurfaces({}, colliders), withSurfaces({}, ofText), []).changes;
+  assert.deepEqual(restored(ofMessage(0.3)), []);
+  assert.deepEqual(restored(ofMessage(0.7)), [{ name: "friction", value: Math.fround(0.3) }]);
+  assert.deepEqual(restored([...ofMessage(0.3).slice(0, 2), ofMessage(0.7)[2]]), [{ name: "friction", value: Math.fround(0.3) }]);
+});

@@ -1,6 +1,7 @@
 //! Undo: cuts, resets and loads by keys, by links and in another rate, and what others have done since.
 
 use integration_tests::ctl;
+use serde_json::json;
 
 use crate::support::{Button, Rig, State};
 
@@ -112,8 +113,9 @@ fn loads_by_a_link_and_by_digit_keys_are_undone_at_any_rate() {
     let before = rig.settled();
     // The digit only goes to the card of the scene: a slip of the finger changes nothing for other pages.
     rig.tab.key(digit);
-    rig.tab.wait("document.activeElement.dataset.scene !== undefined");
-    assert_eq!(rig.tab.evaluate("viewer.scene"), "curtain");
+    let card = format!("viewer.scenes[{digit} - 1].name");
+    rig.tab.wait(&format!("document.activeElement.dataset.scene === {card}"));
+    assert_eq!(rig.tab.evaluate("[viewer.scene, viewer.unanswered]"), json!(["curtain", 0]));
     rig.tab.evaluate("document.activeElement.click()");
     rig.tab.wait("viewer.scene !== 'curtain' && viewer.frame >= 0");
     rig.tab.wait("!document.querySelector('#undo').disabled");

@@ -1,4 +1,5 @@
-//! Undoes what pages have changed: drags, moves, pushes, pins, cuts, resets, loads and jumps.
+//! Undoes what pages have changed: drags, moves, pushes, pins, cuts, parameters, resets,
+//! loads and jumps.
 //!
 //! A change is undone by a rewind to the last step before it. Where the node no longer keeps that step,
 //! because another scene was loaded since, the bridge gives it the state back that it kept when the page

@@ -184,7 +184,8 @@ export class ColorLegend {
     const { found } = this.scan;
     const { quantity } = this;
     if (quantity === "speed" || found === null) return "";
-    const rounding = found.resolution > RESOLUTION_SHARE * this.app.renderer.coloring.high ? ` Positions are rounded: ±${readable(found.resolution, this.unit())}.` : "";
+    const { low, high } = this.app.renderer.coloring;
+    const rounding = found.resolution > RESOLUTION_SHARE * (high - low) ? ` Positions are rounded: ±${readable(found.resolution, this.unit())}.` : "";
     return `${quantity === "tension" ? tensionNote(found, this.app.simulation.node?.method ?? null) : ""}${rounding}`.trim();
   }
 

@@ -16,7 +16,7 @@ export class Parts {
     this.isBusy = false;
   }
 
-  /** Adds a piece. Resolves once the message is whole and has been passed on; at once if pieces are missing. @param {Part} part */
+  /** Adds a piece. Resolves once the message is whole and has been passed on, at once if pieces are missing; rejects if it cannot be unpacked. @param {Part} part */
   async add({ ofKind, offset, size, unpackedSize, bytes }) {
     if (offset === 0) this.bytes = new Uint8Array(size);
     this.bytes.set(bytes, offset);
@@ -26,10 +26,12 @@ export class Parts {
     const { bytes: whole } = this;
     this.bytes = new Uint8Array(0);
     this.isBusy = unpackedSize > 0;
-    const message = this.isBusy ? await unpacked(whole, unpackedSize) : whole.buffer;
-    this.isBusy = false;
-    if (ofKind === SCENE) this.onProgress(null);
-    this.onMessage(message);
+    try {
+      this.onMessage(this.isBusy ? await unpacked(whole, unpackedSize) : whole.buffer);
+    } finally {
+      this.isBusy = false;
+      if (ofKind === SCENE) this.onProgress(null);
+    }
   }
 }
 

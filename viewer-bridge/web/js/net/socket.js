@@ -124,11 +124,17 @@ export class Connector {
     try {
       await parts.add(part);
     } catch (error) {
-      parts.isBusy = false;
-      this.handlers.onFault(`A message could not be read: ${error}`);
+      if (parts === this.parts) this.handlers.onFault(`A message could not be read: ${error}`);
     }
     // Another connection has its own.
-    while (parts === this.parts && !parts.isBusy && this.waiting.length > 0) this.receive(/** @type {string | ArrayBuffer} */ (this.waiting.shift()));
+    while (parts === this.parts && !parts.isBusy && this.waiting.length > 0) {
+      try {
+        this.receive(/** @type {string | ArrayBuffer} */ (this.waiting.shift()));
+      } catch (error) {
+        // The messages behind it still arrive in their order.
+        this.handlers.onFault(`A message could not be read: ${error}`);
+      }
+    }
   }
 
   /** @param {string} data */

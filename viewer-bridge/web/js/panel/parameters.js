@@ -47,12 +47,14 @@ export const ROWS = [
 export const rowsOf = (method, hasBends, hasColliders = false) =>
   ROWS.filter((row) => (row.method === undefined || row.method === (method ?? "xpbd")) && (hasBends || row.parts !== "blocks") && (hasColliders || row.parts !== "colliders"));
 
-/** Adds the friction and restitution of colliders to parameters, by index, and under "all" if they are equal.
+/** Adds the friction and restitution of colliders to parameters, by index, and under "all" if they are equal. Messages and JSON
+ * have them at two precisions, so they are rounded to 32 bits.
  * @param {Values | null} values @param {Surface[]} colliders @returns {Values | null} */
 export function withSurfaces(values, colliders) {
   const byPart = (/** @type {"friction" | "restitution"} */ name) => {
-    const all = colliders.length > 0 && colliders.every((one) => one[name] === colliders[0][name]) ? colliders[0][name] : null;
-    return { all, ...Object.fromEntries(colliders.map((one) => [one.index, one[name]])) };
+    const rounded = colliders.map((one) => Math.fround(one[name]));
+    const all = rounded.length > 0 && rounded.every((value) => value === rounded[0]) ? rounded[0] : null;
+    return { all, ...Object.fromEntries(colliders.map((one, k) => [one.index, rounded[k]])) };
   };
   return values === null ? null : { ...values, friction: byPart("friction"), restitution: byPart("restitution") };
 }
@@ -144,12 +146,14 @@ export function restoring(rows, values, initial, kinds) {
   const lost = [];
   for (const row of rows) {
     const blocks = row.parts === "blocks" ? blockValues(values).map((one) => String(one.block)) : [];
-    const colliders = row.parts === "colliders" ? Object.keys(values[row.name] ?? {}).filter((part) => part !== "all") : [];
+    // A value that all colliders have in the scene is one command.
+    const isEqual = row.parts !== "colliders" || valueOf(initial, row.name, "all") !== null;
+    const colliders = isEqual ? ["all"] : Object.keys(values[row.name] ?? {}).filter((part) => part !== "all");
     for (const part of row.parts === "kinds" ? kinds : row.parts === "colliders" ? colliders : [undefined, ...blocks]) {
       const [now, first] = [values, initial].map((one) => valueOf(one, row.name, part ?? ""));
       if (String(now) === String(first)) continue;
       if (first === null && row.parts !== undefined) lost.push(row.label);
-      else changes.push({ name: row.name, value: first, ...(part === undefined ? {} : { part }) });
+      else changes.push({ name: row.name, value: first, ...(part === undefined || part === "all" ? {} : { part }) });
     }
   }
   return { changes, lost: [...new Set(lost)] };

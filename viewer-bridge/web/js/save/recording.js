@@ -21,8 +21,11 @@ export class RecordingControl {
     this.said = find("recording-said", HTMLElement);
     /** The line of the last recording is closed: by the user, after a while, or because this page has not seen it run. */
     this.isClosed = true;
-    /** This page has started or stopped the recording. */
+    /** This page has asked for the newest recording, or for its end. */
     this.isOwn = false;
+    /** This page has asked for a recording that has not begun. */
+    this.hasAsked = false;
+    this.wasRunning = false;
     this.timer = 0;
     this.button.addEventListener("click", () => this.toggle());
     this.close.addEventListener("click", () => this.closeLine());
@@ -32,16 +35,20 @@ export class RecordingControl {
 
   toggle() {
     if (this.button.disabled) return;
-    this.isOwn = true;
-    this.commands.run(isRunning(this.simulation.recording) ? "stop_recording" : "record");
+    const isEnd = isRunning(this.simulation.recording);
+    if (isEnd) this.isOwn = true;
+    else this.hasAsked = true;
+    this.commands.run(isEnd ? "stop_recording" : "record");
   }
 
   update() {
     const { recording } = this.simulation;
     clearTimeout(this.timer);
-    if (isRunning(recording) || this.isOwn) this.isClosed = false;
+    const isNew = isRunning(recording) && !this.wasRunning;
+    this.wasRunning = isRunning(recording);
+    if (isNew) [this.isOwn, this.hasAsked] = [this.hasAsked, false];
+    if (isRunning(recording)) this.isClosed = false;
     else if (!this.isClosed) this.closeLater(endsAfterMs(recording, this.isOwn));
-    if (!isRunning(recording)) this.isOwn = false;
     this.show();
     const isQuiet = recording === null || recording.state === "idle" || recording.state === "unavailable";
     const said = isQuiet ? "" : isRunning(recording) ? "Recording." : describe(recording);

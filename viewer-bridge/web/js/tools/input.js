@@ -141,6 +141,8 @@ export class Input {
     const { particle } = tool;
     if (this.tool !== tool || particle === null || distance(tool.start, tool.pointer) > SLACK) return false;
     this.finish();
+    // The release selects nothing.
+    this.click = null;
     togglePin(this.app, particle);
     return true;
   }

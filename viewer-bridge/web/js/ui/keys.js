@@ -35,6 +35,15 @@ export function keyName({ key, ctrlKey, metaKey, altKey, shiftKey, repeat }) {
 /** Key of the choice in localStorage. */
 const CHARACTERS_OFF = "catenary-character-keys-off";
 
+/** Uses the storage of the browser; null if the user blocks it. @template T @param {(storage: Storage) => T} use */
+function stored(use) {
+  try {
+    return use(localStorage);
+  } catch {
+    return null;
+  }
+}
+
 /** True for a key that types a character, as dictation and a slip of the hand do. The space bar and Ctrl with a key are not among them. @param {string} name */
 export const isCharacter = (name) => name.length === 1 && name !== " ";
 
@@ -42,10 +51,9 @@ export const isCharacter = (name) => name.length === 1 && name !== " ";
 export class CharacterKeys {
   constructor() {
     this.box = find("character-keys", HTMLInputElement);
-    this.box.checked = localStorage.getItem(CHARACTERS_OFF) === null;
+    this.box.checked = stored((storage) => storage.getItem(CHARACTERS_OFF)) === null;
     this.box.addEventListener("change", () => {
-      if (this.box.checked) localStorage.removeItem(CHARACTERS_OFF);
-      else localStorage.setItem(CHARACTERS_OFF, "");
+      stored((storage) => (this.box.checked ? storage.removeItem(CHARACTERS_OFF) : storage.setItem(CHARACTERS_OFF, "")));
     });
   }
 

@@ -1,4 +1,4 @@
-// Words to a newcomer: the hint over the cloth, and the question before a link loads a scene.
+// Words to a newcomer: the hint over the cloth, and the questions before a load that others would notice.
 
 import { find } from "./dom.js";
 

@@ -4,7 +4,7 @@ import { find, make } from "./dom.js";
 
 /** @typedef {import("../net/messages.js").SceneEntry} SceneEntry */
 
-/** Scenes that a digit key loads. */
+/** Number of scenes whose cards have a digit key. */
 const DIGITS = 9;
 
 /** The scene `by` places after `name` in a list that continues at its start; the first one if the name is not in it.
