@@ -8,8 +8,8 @@ use viewer_bridge::scene::catalog::Catalog;
 use crate::picture::SWINGING;
 use crate::support::{Button, Rig};
 
-/// Particle of the drape in the middle of its hem.
-const HEM: usize = 23 * 49 + 24;
+/// Particle of the drape near a corner of its hem, which sways by 11 cm with each gust.
+const HEM: usize = 23 * 49 + 47;
 
 #[test]
 #[ignore = "needs Chromium"]
@@ -20,10 +20,10 @@ fn the_page_opens_on_something_that_moves_with_a_hint_until_it_is_touched() {
         rig.tab.evaluate("document.querySelector('#hint').textContent"),
         "Drag the cloth. Right-drag cuts it."
     );
-    // The hem of the folds sways by 2 cm, half of a cell, within a period of the gusts.
+    // Wherever the hem is, it comes at least half of its way from there within a period of the gusts.
     let first = rig.state().particles[HEM].position[2];
     rig.wait_for_state("the hem to sway", |state| {
-        (state.particles[HEM].position[2] - first).abs() > 0.02
+        (state.particles[HEM].position[2] - first).abs() > 0.04
     });
     // Turning the view is no touch.
     let camera = rig.tab.camera();
