@@ -6,8 +6,8 @@ use std::path::Path;
 use fastrand::Rng;
 use recorder::{FrameReader, LogReader};
 use sim_contract::{
-    Action, Client, ELEMENTS_MAX, Endpoint, GivenState, Outcome, ParameterValue, ParticleState,
-    Reason, RestoreContents, Text, scene_hash,
+    Action, Client, ELEMENTS_MAX, Endpoint, GivenState, MovedObject, Outcome, ParameterValue,
+    ParticleState, PathPoint, Reason, RestoreContents, Text, scene_hash,
 };
 
 use crate::process::{Process, ctl, record};
@@ -186,7 +186,8 @@ fn action(held: &HeldState, rng: &mut Rng) -> Action {
     // Some are just past the last one.
     let particle = rng.u32(0..held.particle_count() + 32);
     let target = [rng.f32() - 0.5, rng.f32() - 0.5, rng.f32() - 0.5];
-    match rng.u32(0..14) {
+    let (translation, rotation) = (target, [0.0, 0.0, 0.0, 1.0]);
+    match rng.u32(0..16) {
         0 => Action::Rewind { to_step: None, back_steps: Some(rng.u32(0..100)) },
         1 => Action::Rewind { to_step: Some(rng.u64(0..2000)), back_steps: None },
         2 => Action::Reset,
@@ -199,6 +200,13 @@ fn action(held: &HeldState, rng: &mut Rng) -> Action {
         // They change every constraint, which a node prepares beside the loop if there are many.
         9 => set("compliance", rng.f32() * 1e-4),
         10 => set("tear_stretch", 2.0 + rng.f32()),
+        // Motions that are on their way for many steps.
+        11 => Action::MoveCollider { collider: 0, translation, rotation, over_s: rng.f32() * 0.5 },
+        12 => {
+            let point = |time| PathPoint { time, translation, rotation };
+            let points = [point(0.1), point(0.3 + rng.f64())];
+            Action::follow(MovedObject::Collider, 0, &points, rng.bool()).swap_remove(0)
+        }
         _ => Action::Grab { particle, target, over_s: rng.f32() * 0.5 },
     }
 }

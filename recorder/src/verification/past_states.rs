@@ -109,7 +109,7 @@ impl Rest {
 
     /// Returns `true` if a step without commands before it has changed nothing of this.
     fn is_same(&self, solver: &Solver) -> bool {
-        solver.grabs().len() == 0
+        !solver.changes_without_commands()
             && self.torn_count == solver.torn().len()
             && self.frozen_count == solver.frozen_count()
     }

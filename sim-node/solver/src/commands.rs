@@ -13,7 +13,7 @@ use crate::checks::{check_finite, is_near};
 use crate::contacts::bodies::driven_body::BodyMotion;
 use crate::frame::{Frame, Pose};
 use crate::parameters::{Affected, Target};
-use crate::solver::Solver;
+use crate::solver::{Overfull, Solver};
 use crate::step::drive::{ActiveGrab, GRAB_HORIZON_S};
 use cut::Sphere;
 use moves::check_over;
@@ -258,12 +258,12 @@ impl Solver {
         let affected = parameters.set(name, value, target, self.context());
         self.parameters = parameters;
         let affected = affected?;
-        if self.parameters.contact_thickness != thickness {
-            // At once, because only the lists of neighbours tell whether they fit.
-            self.derive_particle_contacts();
-            if self.particle_contacts.are_overfull() {
+        // At once, because only the lists of neighbours tell whether they fit.
+        match self.contacts_of_client(self.parameters.contact_thickness) {
+            Ok(Some(contacts)) => self.replace_particle_contacts(contacts),
+            Ok(None) => {}
+            Err(Overfull) => {
                 self.parameters.contact_thickness = thickness;
-                self.derive_particle_contacts();
                 return Err(Reason::OutOfRange);
             }
         }

@@ -50,7 +50,7 @@ impl Path {
 /// A motion that a client has begun: from where the frame was, along points in time, to the last one, where it stays.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Motion {
-    /// Step of the scene at whose end the time is 0. It wraps below step 0 if another step was given to the state.
+    /// Step of the scene at whose end the time is 0.
     start_step: u64,
     /// At least one point, at ascending times in steps. Rotations are unit quaternions.
     points: Vec<Waypoint>,
@@ -61,7 +61,8 @@ pub(crate) struct Motion {
 pub(crate) struct MotionState {
     /// Index of the particle, anchor or collider.
     pub(crate) index: u32,
-    elapsed_steps: u64,
+    /// Step of the scene at whose end the time is 0.
+    start_step: u64,
     /// Time in steps, translation and rotation: from the last point that was passed on.
     points: Vec<(f64, [f32; 3], [f32; 4])>,
 }
@@ -119,7 +120,7 @@ impl Motion {
         (self.frame_after(aim).translation, steps)
     }
 
-    /// Number of points on their way, the last one that was passed included.
+    /// Number of points on their way, the last one that was passed included: one after the end of the motion.
     pub(crate) fn point_count(&self, scene_step: u64) -> usize {
         self.pending(scene_step).len()
     }
@@ -129,7 +130,7 @@ impl Motion {
     }
 
     fn elapsed(&self, scene_step: u64) -> f64 {
-        scene_step.wrapping_sub(self.start_step) as f64
+        elapsed(self.start_step, scene_step)
     }
 
     /// The points from the last one that was passed on.
@@ -144,20 +145,42 @@ impl Motion {
         let point = |point: &Waypoint| (point.time, point.translation, point.rotation);
         MotionState {
             index,
-            elapsed_steps: scene_step.wrapping_sub(self.start_step),
+            start_step: self.start_step,
             points: self.pending(scene_step).iter().map(point).collect(),
         }
     }
 
-    /// The motion of a keyframe of this step that was checked.
-    pub(crate) fn restored(state: &MotionState, scene_step: u64) -> Self {
+    /// True if its frame changes after a step of the scene.
+    pub(crate) fn is_under_way(&self, scene_step: u64) -> bool {
+        let last = self.points.last().map_or(0.0, |last| last.time);
+        self.elapsed(scene_step) < last
+    }
+
+    /// The motion of a keyframe that was checked.
+    pub(crate) fn restored(state: &MotionState) -> Self {
         let point = |&(time, translation, rotation): &_| Waypoint { time, translation, rotation };
         let points = state.points.iter().map(point).collect();
-        Self { start_step: scene_step.wrapping_sub(state.elapsed_steps), points }
+        Self { start_step: state.start_step, points }
     }
 }
 
+/// Number of steps from a step of the scene to another one that is not before it.
+fn elapsed(start_step: u64, scene_step: u64) -> f64 {
+    scene_step.saturating_sub(start_step) as f64
+}
+
 impl MotionState {
+    /// True if its frame changes after a step of the scene.
+    pub(crate) fn is_under_way(&self, scene_step: u64) -> bool {
+        let last = self.points.last().map_or(0.0, |(time, ..)| *time);
+        elapsed(self.start_step, scene_step) < last
+    }
+
+    /// True if it begins after a step of the scene.
+    pub(crate) fn begins_after(&self, scene_step: u64) -> bool {
+        self.start_step > scene_step
+    }
+
     /// The times in steps, and the poses.
     pub(crate) fn points(&self) -> impl ExactSizeIterator<Item = (f64, Pose)> + '_ {
         self.points

@@ -95,6 +95,10 @@ pub(crate) struct Due {
     pub(crate) tethers: bool,
 }
 
+/// Error of a contact distance with too many neighbours at load.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Overfull;
+
 impl Due {
     const ALL: Self = Self { constraints: true, tethers: true };
 }
@@ -278,15 +282,49 @@ impl Solver {
 
     /// Derives the contacts of particles with each other, if their distance has changed.
     pub(crate) fn derive_particle_contacts(&mut self) {
-        let thickness = self.parameters.contact_thickness;
-        if !self.particle_contacts.are_derived_from(thickness) {
-            if !self.accept_particle_contacts() {
-                let kernels = self.store.kernels();
-                self.particle_contacts =
-                    ParticleContacts::new(&self.model, self.contact_mode, thickness, kernels);
-            }
-            self.particle_contacts.locate(&self.store);
+        if let Some(contacts) = self.contacts_at(self.parameters.contact_thickness) {
+            self.replace_particle_contacts(contacts);
         }
+    }
+
+    /// Derives the contacts for a distance, or takes those over that were offered. None if the current ones have it.
+    pub(crate) fn contacts_at(&mut self, thickness: Option<f32>) -> Option<ParticleContacts> {
+        if self.particle_contacts.are_derived_from(thickness) {
+            return None;
+        }
+        let offered = self.take_offered_contacts(thickness);
+        Some(offered.unwrap_or_else(|| {
+            let kernels = self.store.kernels();
+            ParticleContacts::new(&self.model, self.contact_mode, thickness, kernels)
+        }))
+    }
+
+    /// Like [`Self::contacts_at`], for a distance that a client sets. None also for that of the scene, which may be larger.
+    ///
+    /// # Errors
+    /// More neighbours are near each other at load than the lists of pairs that never touch have room for.
+    pub(crate) fn contacts_of_client(
+        &mut self,
+        thickness: Option<f32>,
+    ) -> Result<Option<ParticleContacts>, Overfull> {
+        if thickness == self.initial_parameters.contact_thickness {
+            return Ok(None);
+        }
+        match self.contacts_at(thickness) {
+            Some(contacts) if contacts.are_overfull() => {
+                self.give_away(contacts);
+                Err(Overfull)
+            }
+            contacts => Ok(contacts),
+        }
+    }
+
+    /// Puts contacts in the place of the current ones.
+    pub(crate) fn replace_particle_contacts(&mut self, mut contacts: ParticleContacts) {
+        contacts.overflow_count = self.particle_contacts.overflow_count;
+        contacts.locate(&self.store);
+        let replaced = std::mem::replace(&mut self.particle_contacts, contacts);
+        self.give_away(replaced);
     }
 
     /// Updates the locations of particles after a change of the layout.

@@ -48,7 +48,7 @@ impl Solver {
     /// a large scene can take seconds. `stop` must stay true.
     ///
     /// Returns `false` if the step was given up. Its state is neither the old nor the new one, so the
-    /// solver is of no further use.
+    /// solver is of no further use. The caller knows that, so nothing is refused as it is after a panic.
     #[must_use]
     pub fn step_unless(&mut self, stop: &AtomicBool) -> bool {
         self.finish_boundary();

@@ -208,6 +208,49 @@ fn prepared_contacts_change_no_bit() {
     assert_eq!(assisted.plan_count, 14, "each has work to plan");
 }
 
+/// The spare of a plan for contacts alone has the tethers that it had when it was in use.
+#[test]
+fn constraints_of_a_spare_come_back_without_its_tethers() {
+    let text = format!("{SCENE}[contact]\nmode = \"particles\"\nthickness = 0.02\n");
+    let mut plain = solver(&text);
+    let mut assisted = Assisted { solver: plain.clone(), spare: None, plan_count: 0 };
+    let change = |plain: &mut Solver, assisted: &mut Assisted, actions: &[Action]| {
+        let plan = assisted.solver.plan([actions[0]]);
+        let prepared = assisted.prepare(plan);
+        for action in actions {
+            plain.apply(7, action).unwrap();
+        }
+        let apply = |solver: &mut Solver| {
+            for action in actions {
+                solver.apply(7, action).unwrap();
+            }
+        };
+        assisted.finish(prepared, apply);
+    };
+    let steps = |plain: &mut Solver, assisted: &mut Assisted| {
+        for _ in 0..40 {
+            plain.step();
+            assisted.solver.step();
+            assert_eq!(plain.state_hash(), assisted.solver.state_hash());
+        }
+    };
+    change(&mut plain, &mut assisted, &[set(Parameter::Substeps, 3.0)]);
+    steps(&mut plain, &mut assisted);
+    // Without pins, no tether holds anything.
+    for solver in [&mut plain, &mut assisted.solver] {
+        solver.unpin(0).unwrap();
+        solver.unpin(27).unwrap();
+    }
+    steps(&mut plain, &mut assisted);
+    change(
+        &mut plain,
+        &mut assisted,
+        &[set(Parameter::Contact, 0.03), set(Parameter::Substeps, 2.0)],
+    );
+    steps(&mut plain, &mut assisted);
+    assert_eq!(assisted.plan_count, 2);
+}
+
 #[test]
 fn settings_that_follow_each_other_are_prepared_together() {
     let actions = [

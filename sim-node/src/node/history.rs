@@ -121,7 +121,7 @@ impl History {
         let (torn_count, frozen_count) = (solver.torn().len(), solver.frozen_count());
         let is_same = |newest: &mut Newest| {
             !is_commanded
-                && solver.grabs().len() == 0
+                && !solver.changes_without_commands()
                 && (newest.torn_count, newest.frozen_count) == (torn_count, frozen_count)
         };
         if self.newest.as_mut().is_none_or(|newest| !is_same(newest)) {
@@ -258,7 +258,7 @@ impl History {
 #[cfg(test)]
 mod tests {
     //! Checks which states are kept, and that each is the one of its step.
-    use sim_solver::{Grab, Scene, builtin};
+    use sim_solver::{Grab, Pose, Scene, builtin};
 
     use super::*;
 
@@ -355,6 +355,31 @@ mod tests {
                 assert_eq!(again.state_hash(), hashes[usize::try_from(step).unwrap()], "{step}");
             }
         }
+    }
+
+    #[test]
+    fn a_state_on_the_way_of_a_collider_is_kept_with_its_place() {
+        let text = "version = 1\n[[particle]]\nposition = [0, 0.2, 0]\n\
+            [[collider]]\nshape = \"sphere\"\ncenter = [0, 0, 0]\nradius = 0.1\n";
+        let scene = Scene::from_toml(text, "test").unwrap();
+        let mut solver = Solver::new(&scene);
+        let mut history = History::new(1 << 20, &solver).unwrap();
+        let mut keyframes = Vec::new();
+        for step in 0..200 {
+            let is_commanded = step == 20;
+            if is_commanded {
+                let pose = Pose { translation: [0.3, 0.1, 0.0], rotation: [0.0, 0.0, 0.0, 1.0] };
+                solver.move_collider_over(0, pose, 0.5).unwrap();
+            }
+            solver.step();
+            history.keep(step, &solver, is_commanded);
+            let kept = history.states.back().unwrap();
+            assert_eq!(history.keyframe(kept), solver.keyframe(), "{step}");
+            keyframes.push(Rc::as_ptr(&kept.keyframe));
+        }
+        keyframes.dedup();
+        // One before the motion, one for each step of its 30, none after it.
+        assert_eq!(keyframes.len(), 31);
     }
 
     /// The bytes that a history takes beside its branches.

@@ -251,10 +251,15 @@ fn a_rewind_goes_to_a_step_after_the_lost_grab_of_a_client() {
 
 #[test]
 fn a_live_recording_with_rewinds_and_states_verifies() {
-    for options in [&[][..], &["--every", "7"], &["--history", "1MiB"]] {
+    for (scene, options) in [
+        // It has a collider, which moves.
+        ("drape", &[][..]),
+        ("curtain", &["--every", "7"]),
+        ("curtain", &["--history", "1MiB"]),
+    ] {
         let sandbox = Sandbox::new();
         let file = sandbox.path("run.mcap");
-        let args = [&["run", "curtain", "--rate", "240"], options].concat();
+        let args = [&["run", scene, "--rate", "240"], options].concat();
         let node = node(&sandbox, &args);
         let held = HeldState::read(&sandbox);
         let recording = record(&sandbox, &file);

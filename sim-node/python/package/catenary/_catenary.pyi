@@ -569,7 +569,7 @@ class Simulation:
         """Returns a picture of the current state as `recorder export --png` draws it, from the top to the bottom: red,
         green and blue. Shape: (height, width, 3).
 
-        `size` is width and height in pixels, 960 x 720 by default. `view` is "front", "side", "top" or "iso"; by default it suits the scene.
+        `size` is width and height in pixels. `view` is "front", "side", "top" or "iso"; by default it suits the scene.
         The style "wires" shows particles, constraints and triangles, and "shaded" smooth surfaces. `bounds` are two
         corners of the box that the picture shows, by default around the state: give them to keep the camera still.
         """
@@ -637,7 +637,7 @@ class Recording:
         """Returns a picture of a recorded step as `recorder export --png` draws it, from the top to the bottom: red,
         green and blue. Shape: (height, width, 3).
 
-        `size` is width and height in pixels, 960 x 720 by default. `view` is "front", "side", "top" or "iso"; by default it suits the scene.
+        `size` is width and height in pixels. `view` is "front", "side", "top" or "iso"; by default it suits the scene.
         The style "wires" shows particles, constraints and triangles, and "shaded" smooth surfaces. `bounds` are two
         corners of the box that the picture shows, by default around the state: give them to keep the camera still.
 

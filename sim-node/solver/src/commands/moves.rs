@@ -211,6 +211,13 @@ impl Solver {
         if all <= MOTION_POINTS_MAX { Ok(()) } else { Err(Reason::OutOfRange) }
     }
 
+    /// Returns `true` if the last step may have changed more of the keyframe than the step of the scene, even without
+    /// commands, tears and frozen particles: a client grabs a particle, or a motion was under way.
+    pub fn changes_without_commands(&self) -> bool {
+        let before = self.scene_step().saturating_sub(1);
+        !self.grabs.is_empty() || self.motions().any(|motion| motion.is_under_way(before))
+    }
+
     /// The motions of clients.
     fn motions(&self) -> impl Iterator<Item = &Motion> {
         let grabs = self.grabs.iter().filter_map(|grab| grab.motion.as_ref());

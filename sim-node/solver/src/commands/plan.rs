@@ -6,6 +6,7 @@ use sim_types::Action;
 
 use super::preparation::{Plan, Prepared, Spare};
 use crate::constraints::tethers::TetherBasis;
+use crate::contacts::pairs::ParticleContacts;
 use crate::parameters::{Affected, Parameters, Target};
 use crate::solver::Solver;
 use crate::state::keyframe::Keyframe;
@@ -108,21 +109,29 @@ impl Solver {
         });
         if let Some(offered) = offered {
             store.exchange(offered);
+            if self.settings.has_tethers() {
+                // Those that it had when it was in use.
+                store.detach_tethers(self.model.particle_count());
+            }
             return true;
         }
         false
     }
 
-    /// Takes offered contacts over if they have the current distance.
-    pub(crate) fn accept_particle_contacts(&mut self) -> bool {
-        let Self { offered, particle_contacts, parameters, .. } = self;
-        let offered = offered.as_mut().and_then(|offered| offered.particle_contacts.as_mut());
-        let thickness = parameters.contact_thickness;
-        if let Some(offered) = offered.filter(|offered| offered.are_derived_from(thickness)) {
-            std::mem::swap(particle_contacts, offered);
-            return true;
+    /// Returns the offered contacts if they have this distance.
+    pub(crate) fn take_offered_contacts(
+        &mut self,
+        thickness: Option<f32>,
+    ) -> Option<ParticleContacts> {
+        let offered = &mut self.offered.as_mut()?.particle_contacts;
+        offered.take_if(|offered| offered.are_derived_from(thickness))
+    }
+
+    /// Gives contacts away in the place of those that were taken, so that another thread frees their memory.
+    pub(crate) fn give_away(&mut self, contacts: ParticleContacts) {
+        if let Some(offered) = &mut self.offered {
+            offered.particle_contacts.get_or_insert(contacts);
         }
-        false
     }
 
     /// Takes offered tethers over if they have this basis.

@@ -83,9 +83,5 @@ impl Plan {
         let builder = ConstraintBuilder::new(&self.model, &self.parameters, self.setup);
         // Nothing has a location that could move.
         let _moved = store.configure(&builder, self.fields, &is_torn);
-        if self.fields.tethers > 0 {
-            // Those of the spare.
-            store.detach_tethers(self.model.particle_count());
-        }
     }
 }

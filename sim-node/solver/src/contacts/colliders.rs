@@ -194,7 +194,7 @@ impl Collider {
 
     /// True for a body that stands in the running step, because its program has not sent its command.
     pub(crate) fn is_left_standing(&self) -> bool {
-        self.body.is_some() && self.moved.is_some() && self.driven.is_none()
+        self.body.is_some() && self.moved.is_some() && self.driven.is_none() && !self.is_moving()
     }
 
     /// Frame by its own motion, or the one to which a client has moved it.

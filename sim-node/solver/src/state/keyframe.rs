@@ -126,13 +126,19 @@ impl Keyframe {
         !self.grabs.is_empty()
     }
 
+    /// Returns `true` if steps change more than the step of the scene, even without commands, tears and frozen
+    /// particles: a client grabs a particle, or a motion is under way.
+    pub fn changes_without_commands(&self) -> bool {
+        self.has_grabs() || self.motions.all().any(|motion| motion.is_under_way(self.scene_step))
+    }
+
     /// Returns the parameters of a scene that uses `method`, with a time scale of 1: the pace belongs to
     /// the node and is not part of the state.
     pub fn parameter_values(&self, method: Method) -> ParameterValues {
         self.parameters.values(method)
     }
 
-    /// Returns the same state at another step of the scene.
+    /// Returns the same state at another step of the scene, for the steps that change nothing else.
     #[must_use]
     pub fn at_scene_step(&self, scene_step: u64) -> Self {
         Self { scene_step, ..self.clone() }

@@ -6,7 +6,7 @@ use sim_types::ParticleFlags;
 use thiserror::Error;
 
 use crate::motion::{Motion, MotionState};
-use crate::solver::{Due, Solver};
+use crate::solver::{Due, Overfull, Solver};
 use crate::state::hash::state_hash;
 use crate::state::keyframe::{Keyframe, Motions};
 use crate::state::particles::Particle;
@@ -49,6 +49,12 @@ impl Solver {
         keyframe: &Keyframe,
     ) -> Result<(), RestoreError> {
         self.check_state(particles, keyframe)?;
+        let what = "its contact distance has too many neighbours at load";
+        let contacts = self.contacts_of_client(keyframe.parameters.contact_thickness);
+        let contacts = contacts.map_err(|Overfull| RestoreError::Mismatch { what })?;
+        if let Some(contacts) = contacts {
+            self.replace_particle_contacts(contacts);
+        }
         self.reset();
         self.particles.states.copy_from_slice(particles);
         let frozen = particles.iter().filter(|one| one.flags & ParticleFlags::FROZEN != 0);
@@ -94,7 +100,7 @@ impl Solver {
     }
 
     fn restore_motions(&mut self, motions: &Motions) {
-        let restored = |state: &MotionState| Some(Motion::restored(state, self.scene_step));
+        let restored = |state: &MotionState| Some(Motion::restored(state));
         for state in &motions.grabs {
             if let Ok(place) = self.grabs.binary_search_by_key(&state.index, |one| one.particle) {
                 self.grabs[place].motion = restored(state);

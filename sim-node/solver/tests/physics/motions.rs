@@ -171,7 +171,8 @@ fn appended_points_go_on_with_the_times_of_the_motion() {
     assert_eq!(early, Err(Reason::OutOfRange));
 }
 
-/// A state in the middle of motions continues bit for bit in another solver, also at another step of the scene.
+/// A state in the middle of motions continues bit for bit in another solver, and steps say when they change more of it
+/// than their number.
 #[test]
 fn motions_are_part_of_a_keyframe() {
     let scene = Scene::from_toml(&format!("version = 1\n{SCENE}"), "test").unwrap();
@@ -195,15 +196,17 @@ fn motions_are_part_of_a_keyframe() {
         let particles: Vec<Particle> = whole.particles().to_vec();
         let mut copy = Solver::new(&scene);
         copy.restore(&particles, &keyframe).unwrap();
-        let mut elsewhere = Solver::new(&scene);
-        elsewhere.restore(&particles, &keyframe.at_scene_step(3)).unwrap();
         let mut original = whole.clone();
         for _ in 0..250 {
-            for solver in [&mut copy, &mut original, &mut elsewhere] {
-                solver.step();
-            }
-            assert!(places(&copy) == places(&original) && places(&elsewhere) == places(&original));
-            assert_eq!(copy.keyframe(), original.keyframe());
+            let before = original.keyframe();
+            copy.step();
+            original.step();
+            assert_eq!(places(&copy), places(&original));
+            let after = original.keyframe();
+            assert_eq!(copy.keyframe(), after);
+            assert_eq!(original.changes_without_commands(), before.changes_without_commands());
+            let is_same = before.at_scene_step(original.scene_step()) == after;
+            assert!(is_same || original.changes_without_commands(), "{steps}");
         }
     }
     whole.reset();

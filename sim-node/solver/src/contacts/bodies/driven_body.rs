@@ -52,11 +52,9 @@ fn limited(before: Vec3, after: Vec3, max: f32) -> Vec3 {
     if is_within(after.to_array(), max) {
         return after;
     }
-    let largest = after
-        .to_array()
-        .iter()
-        .fold(0.0, |largest, axis| if axis.abs() > largest { axis.abs() } else { largest });
-    if after.is_finite() { after * (max / largest) } else { before }
+    let shortened = after * (max / after.abs().max_element());
+    // The product may be rounded up.
+    if after.is_finite() { shortened.clamp(Vec3::splat(-max), Vec3::splat(max)) } else { before }
 }
 
 /// The copy of a body that one step moves.
@@ -207,5 +205,23 @@ impl DrivenBody {
     fn turned_by(&self, angular_impulse: Vec3) -> Vec3 {
         let axes = self.before.rotation * self.axes_at_load;
         axes * (self.inverse_inertia * (axes.conjugate() * angular_impulse))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_limited_vector_keeps_its_direction_and_never_exceeds_the_limit() {
+        for largest in [35_898_352.0, -35_898_352.0, 2e7, 1e30, f32::MAX] {
+            let after = Vec3::new(0.25 * largest, -largest, 0.5 * largest);
+            let limited = limited(Vec3::ZERO, after, SPEED_MAX);
+            assert!(is_within(limited.to_array(), SPEED_MAX), "{limited}");
+            assert!((limited / SPEED_MAX - after / largest.abs()).length() < 1e-6, "{limited}");
+        }
+        let before = Vec3::ONE;
+        assert_eq!(limited(before, Vec3::new(1.0, f32::NAN, 0.0), SPEED_MAX), before);
+        assert_eq!(limited(before, Vec3::new(f32::INFINITY, 0.0, 0.0), SPEED_MAX), before);
     }
 }

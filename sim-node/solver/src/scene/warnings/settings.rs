@@ -31,12 +31,12 @@ pub(super) fn excessive_damping(scene: &Scene) -> Option<String> {
     })
 }
 
-/// Part of gravity along `up` below which things do not fall down, but sideways: 5 degrees.
-const DOWN_MIN: f32 = 0.1;
+/// Part of gravity along `up` below which things do not fall down, but sideways: within 5.7 degrees of it.
+const DOWN_MIN: f64 = 0.1;
 
 /// Gravity that points up or sideways, such as the default in a scene with z up.
 pub(super) fn gravity_not_down(scene: &Scene) -> Option<String> {
-    let [x, y, z] = scene.gravity;
+    let [x, y, z] = scene.gravity.map(f64::from);
     let size = (x * x + y * y + z * z).sqrt();
     let (name, along) = match scene.up {
         Up::Y => ("y", y),
@@ -48,6 +48,8 @@ pub(super) fn gravity_not_down(scene: &Scene) -> Option<String> {
     }
     // Without gravity, nothing falls.
     (along > -DOWN_MIN * size).then(|| {
+        #[allow(clippy::cast_possible_truncation, reason = "no component of gravity exceeds f32")]
+        let size = size as f32;
         let down = match scene.up {
             Up::Y => [0.0, -size, 0.0],
             Up::MinusY => [0.0, size, 0.0],

@@ -1,19 +1,16 @@
 //! Checks that a snapshot and a keyframe are a state of a scene. Both come from outside.
 
-use sim_types::ParticleFlags;
+use sim_types::{OVER_S_MAX, ParticleFlags};
 
 use super::{RestoreError, is_held};
 use crate::checks::is_near;
 use crate::constraints::tethers::{TetherBasis, is_root};
 use crate::frame::{Frame, Pose};
-use crate::motion::{MOTION_POINTS_MAX, MotionState};
+use crate::motion::{MOTION_POINTS_MAX, MotionState, steps_at};
 use crate::solver::Solver;
 use crate::state::keyframe::{Keyframe, Motions, Moved};
 use crate::state::particles::Particle;
 use crate::step::drive::GRAB_HORIZON_S;
-
-/// Latest time of a motion, in steps: an hour at the highest rate.
-const MOTION_STEPS_MAX: f64 = 3600.0 * 1e5;
 
 /// Latest step of a scene. Up to it, f64 counts steps exactly.
 const SCENE_STEP_MAX: u64 = 1 << 53;
@@ -152,10 +149,14 @@ impl Solver {
         if count > MOTION_POINTS_MAX {
             return Err("its motions have too many points");
         }
+        let steps_max = steps_at(f64::from(OVER_S_MAX), self.settings.rate_hz);
         for motion in keyframe.motions.all() {
+            if motion.begins_after(keyframe.scene_step) {
+                return Err("a motion begins after the step");
+            }
             let times: Vec<_> = motion.points().map(|(time, _)| time).collect();
             let is_ascending = times.windows(2).all(|pair| pair[0] < pair[1]);
-            let is_time = |time: &f64| (0.0..=MOTION_STEPS_MAX).contains(time);
+            let is_time = |time: &f64| (0.0..=steps_max).contains(time);
             if times.is_empty() || !is_ascending || !times.iter().all(is_time) {
                 return Err("a time of a motion is out of range");
             }

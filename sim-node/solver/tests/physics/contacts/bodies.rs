@@ -368,6 +368,16 @@ fn a_body_without_a_command_stands_like_a_collider_and_is_counted() {
         assert_eq!(body.colliders().next().unwrap().velocity, [0.0; 3]);
     }
     assert_eq!(body.standing_body_steps(), 5);
+    // A motion of a client moves it.
+    body.move_collider_over(0, pose, 0.05).unwrap();
+    for _ in 0..3 {
+        body.step();
+    }
+    assert_eq!(body.standing_body_steps(), 5);
+    body.move_collider(0, pose).unwrap();
+    body.step();
+    body.step();
+    assert_eq!(body.standing_body_steps(), 6);
     let stands = Vec3::from_array(center(&body)) - Vec3::new(0.0, 0.11, 0.0);
     assert_eq!(stands.to_array(), pose.translation);
 }

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use sim_solver::{ParameterValue, Reason, Solver};
+use sim_solver::{ParameterValue, Reason, RestoreError, Solver};
 
 use super::super::{assert_at_most, assert_near, rates, solver, step, stepped};
 use super::cloths::{
@@ -185,21 +185,58 @@ fn particles_in_one_point_stay_finite_and_disturb_nobody() {
 #[test]
 fn a_contact_distance_with_too_many_neighbours_at_load_is_refused_and_changes_no_bit() {
     for mode in ["off", "particles", "surfaces"] {
-        let text = format!(
-            "gravity = [0, 0, 0]\n[contact]\nmode = \"{mode}\"\n[[generate]]\nshape = \"cloth\"\ncolumns = 24\n\
-             rows = 24\nspacing = 0.05\npinned = \"none\"\n"
-        );
-        let mut solver = solver(&text);
+        let text = |thickness: &str| {
+            format!(
+                "gravity = [0, 0, 0]\n[contact]\nmode = \"{mode}\"\n{thickness}\n[[generate]]\nshape = \"cloth\"\n\
+                 columns = 24\nrows = 24\nspacing = 0.05\npinned = \"none\"\n"
+            )
+        };
+        let mut solver = solver(&text(""));
         step(&mut solver, 2);
         let before = (solver.particles().to_vec(), solver.parameter_values());
         let mut set = |thickness| solver.set("contact", ParameterValue::Number(thickness), None);
         assert_eq!(set(0.2), Err(Reason::OutOfRange), "{mode}");
         assert_eq!(set(1e6), Err(Reason::OutOfRange), "{mode}");
         assert_eq!((solver.particles().to_vec(), solver.parameter_values()), before);
+        // A scene may ask for it, and only its own states have it.
+        let mut overfull = self::solver(&text("thickness = 0.2"));
+        let (particles, keyframe) = (overfull.particles().to_vec(), overfull.keyframe());
+        overfull.restore(&particles, &keyframe).unwrap();
+        let restored = solver.restore(&particles, &keyframe);
+        if mode != "off" {
+            assert!(matches!(restored, Err(RestoreError::Mismatch { .. })), "{restored:?}");
+        }
         solver.set("contact", ParameterValue::Number(0.1), None).unwrap();
         step(&mut solver, 20);
         assert_eq!(solver.particles(), before.0, "{mode}: neighbours repel each other");
     }
+}
+
+#[test]
+fn a_refused_contact_distance_leaves_the_contacts_as_they_are() {
+    let mut text = "gravity = [0, 0, 0]\n".to_owned() + &rates(60, 4) + CONTACT;
+    text += "thickness = 0.1\n";
+    for _ in 0..2000 {
+        text += "[[particle]]\nposition = [0, 0, 0]\n";
+    }
+    // So many of them are too many for every distance, also for that of the scene, which may be.
+    let mut pile = solver(&text);
+    step(&mut pile, 3);
+    let mut refusing = pile.clone();
+    let count = refusing.contact_overflow_count();
+    assert!(count > 0, "all pairs fit");
+    let set = refusing.set("contact", ParameterValue::Number(0.2), None);
+    assert_eq!(set, Err(Reason::OutOfRange));
+    for _ in 0..3 {
+        step(&mut pile, 1);
+        step(&mut refusing, 1);
+        assert_eq!(refusing.state_hash(), pile.state_hash());
+        assert_eq!(refusing.contact_overflow_count(), pile.contact_overflow_count());
+    }
+    // Another distance does not forget that contacts were ignored.
+    refusing.set("contact", ParameterValue::Off, None).unwrap();
+    step(&mut refusing, 1);
+    assert!(refusing.contact_overflow_count() > count);
 }
 
 #[test]

@@ -5,7 +5,7 @@ use sim_contract::{
     Action, KeyframeHeader, Load as OwnerLoad, Outcome, Parameter, ParameterValue, ParticleState,
     Reason, ReceivedState, RestoreContents, SnapshotHeader, Text,
 };
-use sim_solver::{Scene, Solver, builtin};
+use sim_solver::{Pose, Scene, Solver, builtin};
 
 use super::{Fixture, RUN_ID, Sent, load, newest_text};
 use crate::limits::UNDO_MAX;
@@ -38,12 +38,26 @@ fn keyframe() -> Vec<u8> {
     Solver::new(&scene).keyframe().encode()
 }
 
+/// A keyframe of step 1, in which a collider is on its way for a minute.
+fn keyframe_in_motion() -> Vec<u8> {
+    let scene = Scene::from_toml(builtin::text("drape").unwrap(), "drape").unwrap();
+    let mut solver = Solver::new(&scene);
+    let pose = Pose { translation: [0.0, 0.1, 0.0], rotation: [0.0, 0.0, 0.0, 1.0] };
+    solver.move_collider_over(0, pose, 60.0).unwrap();
+    solver.step();
+    solver.keyframe().encode()
+}
+
 impl Fixture {
     /// Shows a load of a named scene, whose step has a keyframe.
     fn begin(&mut self, name: &str, step: u64, topology_revision: u32) {
+        self.begin_with(name, step, topology_revision, &keyframe());
+    }
+
+    fn begin_with(&mut self, name: &str, step: u64, topology_revision: u32, keyframe: &[u8]) {
         self.owner.load(&named(name, step, topology_revision)).unwrap();
         let header = KeyframeHeader { run_id: RUN_ID, step, ..KeyframeHeader::default() };
-        self.owner.publish_keyframe(header, &keyframe()).unwrap();
+        self.owner.publish_keyframe(header, keyframe).unwrap();
         self.publish_kept(step, topology_revision, step);
         self.read();
     }
@@ -298,6 +312,18 @@ fn a_load_is_undone_by_the_former_scene_and_its_state() {
     let read = sim_solver::Keyframe::decode(&keyframe()).unwrap();
     assert_eq!(given.encode(), read.at_scene_step(25).encode());
     assert_eq!(fixture.answer_of_undo()["text"], "Undid the load of another scene.");
+}
+
+#[test]
+fn a_state_on_the_way_of_a_collider_is_not_completed_by_an_earlier_keyframe() {
+    let mut fixture = Fixture::start();
+    fixture.begin_with("curtain", 1, 1, &keyframe_in_motion());
+    fixture.publish_kept(25, 1, 1);
+    fixture.read();
+    fixture.change(Command::Load { scene: "rope".to_owned() }, 30);
+    fixture.begin("rope", 30, 2);
+    fixture.undo(false);
+    assert!(fixture.arrived().is_empty(), "the collider would be elsewhere");
 }
 
 #[test]

@@ -28,8 +28,8 @@ impl Keyframes {
 
     /// Returns the keyframe that completes a state, if it is certain and no particle is grabbed.
     ///
-    /// Between two keyframes, only the step of the scene changes, unless something tears or freezes, or a
-    /// particle is grabbed: commands other than the motion of a grab have a keyframe of their own.
+    /// Between two keyframes, only the step of the scene changes, unless something tears or freezes, a particle is
+    /// grabbed, or a motion is under way: commands other than the motion of a grab have a keyframe of their own.
     fn of_state(&self, state: &LoadedState<'_>) -> Option<Vec<u8>> {
         let header = state.header;
         let at = |step| self.0.iter().rev().find(|(one, _)| *one == step);
@@ -40,6 +40,9 @@ impl Keyframes {
         }
         if *step == header.step {
             return Some(bytes.clone());
+        }
+        if keyframe.changes_without_commands() {
+            return None;
         }
         let is_frozen = state.particles.iter().any(|one| one.flags & ParticleFlags::FROZEN != 0);
         (!is_frozen).then(|| keyframe.at_scene_step(header.scene_step).encode())
