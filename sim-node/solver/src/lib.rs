@@ -59,6 +59,7 @@ pub use sim_types::{
 };
 pub use solver::Solver;
 pub use state::blocks::{Blocks, Chain};
+pub use state::energy::{Energy, EnergyMeter};
 pub use state::forces::{ColliderImpulse, Forces, FrameImpulse, ParticleImpulse};
 pub use state::keyframe::{Keyframe, KeyframeError};
 pub use state::particles::Particle;

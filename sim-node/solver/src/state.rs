@@ -1,6 +1,7 @@
 //! The state of a scene between two steps: particles, torn constraints, keyframes and the hash.
 
 pub(crate) mod blocks;
+pub(crate) mod energy;
 pub(crate) mod forces;
 pub(crate) mod hash;
 pub(crate) mod keyframe;

@@ -378,8 +378,8 @@ mod tests {
             keyframes.push(Rc::as_ptr(&kept.keyframe));
         }
         keyframes.dedup();
-        // One before the motion, one for each step of its 30, none after it.
-        assert_eq!(keyframes.len(), 31);
+        // One before the motion, one for each of its 120 steps, and none after it.
+        assert_eq!(keyframes.len(), 121);
     }
 
     /// The bytes that a history takes beside its branches.

@@ -9,6 +9,7 @@ use crate::constraints::Constraint;
 use crate::constraints::bends::Bend;
 use crate::constraints::families::Sheet;
 use crate::constraints::incidence::Incidence;
+use crate::constraints::sides::TornSides;
 use sim_types::Method;
 
 /// Every particle, constraint and triangle of a scene; immutable from load to load.
@@ -132,6 +133,13 @@ impl Model {
     /// Returns the particles of each constraint.
     pub(crate) fn pairs(&self) -> impl Iterator<Item = [u32; 2]> + '_ {
         self.constraints.iter().map(|one| [one.a, one.b])
+    }
+
+    /// Returns the sides of the paths of the bends, none of which is torn.
+    pub(crate) fn bend_sides(&self) -> TornSides {
+        let sides = (0_u32..).zip(&self.bends);
+        let sides = sides.flat_map(|(index, bend)| bend.path().map(move |side| (index, side)));
+        TornSides::new(self.pairs(), self.bends.len(), sides)
     }
 
     /// Returns the distance between two particles in f32, as a step measures it.

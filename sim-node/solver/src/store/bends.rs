@@ -15,11 +15,6 @@ pub(crate) struct StoredBends {
 
 impl StoredBends {
     pub(crate) fn new(model: &Model) -> Self {
-        let sides = (0_u32..).zip(&model.bends);
-        let sides = sides.flat_map(|(index, bend)| bend.path().map(move |side| (index, side)));
-        Self {
-            locations: vec![Location::default(); model.bends.len()],
-            sides: TornSides::new(model.pairs(), model.bends.len(), sides),
-        }
+        Self { locations: vec![Location::default(); model.bends.len()], sides: model.bend_sides() }
     }
 }

@@ -11,6 +11,7 @@ mod bending;
 mod colliders;
 mod constraints;
 mod contacts;
+mod energy;
 mod forces;
 mod hardening;
 mod motion;
