@@ -35,6 +35,7 @@
 //!     wake_late_ns: 0,
 //!     solve_ns: 0,
 //!     snapshot_index: Some(0),
+//!     energy: None,
 //! };
 //! log.write(&Message::Step(row), 0)?;
 //! log.write(&Message::Particles { step: 0, particles: vec![ParticleState::default()] }, 0)?;
@@ -53,6 +54,7 @@
 
 mod complete_state;
 mod counted;
+mod energy;
 mod intact_parts;
 mod log;
 pub mod pictures;
@@ -67,6 +69,7 @@ pub mod verification;
 
 pub use complete_state::{CompleteState, CompleteStateError, complete_state};
 pub use counted::counted;
+pub use energy::{EnergyRow, RecordedEnergy};
 pub use intact_parts::{IntactParts, load_rows};
 pub use log::*;
 pub use recorded_scene::{RecordedSceneError, recorded_scene, scene_to_simulate};

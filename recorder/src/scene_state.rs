@@ -1,16 +1,19 @@
 //! The state of a scene at a snapshot, with everything that pictures and meshes show.
 
+use std::collections::VecDeque;
 use std::io::Read;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use sim_contract::{ColliderState, ConstraintState, ParticleState, Torn, Triangle};
+use sim_contract::{
+    ColliderState, ConstraintState, ParameterValues, ParticleState, Torn, Triangle,
+};
 use sim_solver::scene::{ColliderMesh, ColliderMeshes};
 use sim_solver::{Scene, Solver, TornSides};
 
 use crate::log::{
     ColliderRow, CollidersRow, ForcesRow, Frame, FrameReader, LogReader, Message, OutcomeRow,
-    ReadError, ShapeRow, StepRow, Tape, TapeError, TearTracker, constraint_state,
+    ParametersRow, ReadError, ShapeRow, StepRow, Tape, TapeError, TearTracker, constraint_state,
 };
 use crate::recorded_scene::recorded_scene;
 use crate::simulation::{colliders_row, forces_row, step_row};
@@ -73,26 +76,39 @@ pub struct SceneState {
     pub outcomes: Vec<OutcomeRow>,
     /// The forces of the step, if the recording has them.
     pub forces: Option<ForcesRow>,
+    /// The parameters of the step, if the recording has them.
+    pub parameters: Option<ParameterValues>,
 }
 
-/// Reads a recording and calls `visit` with its state at each of `steps`, which ascend, until
-/// `visit` breaks.
+/// Reads a recording and calls `visit` with its state at each recorded step of `steps`, which ascend, until
+/// `visit` breaks. `0..` are all steps.
 ///
 /// # Errors
 /// The file cannot be read, its messages contradict each other, or `visit` fails.
 pub fn visit_states<R: Read, E: From<SceneStateError>>(
     log: LogReader<R>,
-    steps: &[u64],
+    steps: impl IntoIterator<Item = u64>,
     mut visit: impl FnMut(&SceneState) -> Result<ControlFlow<()>, E>,
 ) -> Result<(), E> {
-    let mut steps = steps.iter().copied().peekable();
+    let mut steps = steps.into_iter().peekable();
     let mut frames = FrameReader::new(log);
     let mut state = SceneState::default();
     let mut tears = TearTracker::new(Torn::default());
+    // Those of later steps may arrive early.
+    let mut parameters: VecDeque<ParametersRow> = VecDeque::new();
     while steps.peek().is_some() {
         let Some(frame) = frames.next_frame().map_err(SceneStateError::from)? else { break };
+        for message in &frame.updates {
+            if let Message::Parameters(row) = message {
+                parameters.push_back(row.clone());
+            }
+        }
         state.apply_frame(frame, &mut tears)?;
+        while let Some(row) = parameters.pop_front_if(|row| row.step <= state.row.step) {
+            state.parameters = Some(row.values);
+        }
         state.read_meshes(frames.log());
+        while steps.next_if(|step| *step < state.row.step).is_some() {}
         if steps.next_if_eq(&state.row.step).is_some() {
             state.set_torn(tears.at(state.row.step).iter().flat_map(|torn| torn.indices()))?;
             state.check_indices()?;

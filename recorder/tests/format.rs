@@ -46,6 +46,7 @@ fn step_row(step: u64) -> StepRow {
         wake_late_ns: u64::MAX,
         solve_ns: 5,
         snapshot_index: Some(7),
+        energy: None,
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod action;
 mod command;
+mod energy;
 mod forces;
 mod hint;
 mod parameters;
@@ -35,7 +36,7 @@ pub(crate) fn ctl(args: &CtlArgs) -> anyhow::Result<Exit> {
 fn answer(client: &mut Client, args: &CtlArgs, query: &QueryVerb) -> anyhow::Result<()> {
     match query {
         QueryVerb::Get { parameter } => parameters::print(client, args, *parameter),
-        QueryVerb::Status => status::print(client, args),
+        QueryVerb::Status { energy } => status::print(client, args, *energy),
         QueryVerb::Hash => particles::print_hash(client, args),
         QueryVerb::Forces => forces::print(client, args),
         QueryVerb::Particles { indices } => particles::print(client, args, indices),

@@ -210,13 +210,14 @@ fn export<R: Read>(
         let bar = progress_bar(steps.len() as u64);
         // Only errors of reading get the name of the recording.
         let mut refused = None;
-        let visited: Result<(), SceneStateError> = visit_states(open()?, steps, |state| {
-            bar.inc(1);
-            visitor(state).or_else(|error| {
-                refused = Some(error);
-                Ok(ControlFlow::Break(()))
-            })
-        });
+        let visited: Result<(), SceneStateError> =
+            visit_states(open()?, steps.iter().copied(), |state| {
+                bar.inc(1);
+                visitor(state).or_else(|error| {
+                    refused = Some(error);
+                    Ok(ControlFlow::Break(()))
+                })
+            });
         bar.finish_and_clear();
         visited.with_context(|| output::path_text(&args.file))?;
         refused.map_or(Ok(()), Err)

@@ -2,6 +2,7 @@
 
 mod bins;
 mod columns;
+mod energy;
 mod graph;
 mod report;
 mod survey;
@@ -21,6 +22,7 @@ use crate::cli::exit::Exit;
 use crate::cli::file_args::OverwriteArgs;
 use crate::cli::output::{self, AsJson};
 use columns::{ColumnCollector, Columns};
+use energy::EnergyReport;
 use graph::{COLUMNS_MAX, Graph};
 use report::Info;
 use survey::inspect;
@@ -34,6 +36,7 @@ use timing::{Timing, period_ns};
     or damaged.\n\nExamples:\n  \
     recorder info run.mcap\n  \
     recorder info run.mcap --json\n  \
+    recorder info run.mcap --energy\n  \
     recorder info run.mcap --timing --svg timing.svg"
 )]
 pub(crate) struct InfoArgs {
@@ -42,6 +45,10 @@ pub(crate) struct InfoArgs {
     /// Print only the late steps and the measured times. Fails if no time was measured
     #[arg(long)]
     timing: bool,
+    /// Print the energy of the first and of the last snapshot, and the limits of its sum: recorded, or measured if it was
+    /// not recorded
+    #[arg(long, conflicts_with = "timing")]
+    energy: bool,
     /// Draw wake-up lateness and solver time over the steps into this SVG file
     #[arg(long, value_name = "OUT.svg", requires = "timing")]
     svg: Option<PathBuf>,
@@ -91,12 +98,16 @@ fn check_output(args: &InfoArgs, svg: &Path) -> anyhow::Result<()> {
     Ok(args.overwrite.existing().check(svg)?)
 }
 
-/// Prints the report, or the measured times, and draws these if asked to.
+/// Prints the report, the energy, or the measured times, and draws these if asked to.
 fn print<R: Read>(
     args: &InfoArgs,
     info: &Info,
     open: impl FnOnce() -> Result<LogReader<R>, ReadError>,
 ) -> anyhow::Result<()> {
+    if args.energy {
+        let energy = EnergyReport::read(open()?)?;
+        return output::result(args.as_json, &energy, &energy.to_string());
+    }
     if !args.timing {
         return output::result(args.as_json, info, &info.to_string());
     }

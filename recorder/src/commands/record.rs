@@ -109,7 +109,7 @@ pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
 
     let queue = Arc::new(Queue::new(queue_bytes));
     let position = Arc::new(WritePosition::default());
-    let intake = Intake::new(args.steps);
+    let intake = Intake::new(args.steps).with_energy(selection.has_energy());
     let writing = writing::start(Arc::clone(&queue), Arc::clone(&position), options, file)?;
     let live = LiveLine::new(Arc::clone(&queue), Arc::clone(&position), args.progress);
     let feed = Feed::new(intake, Arc::clone(&queue), Arc::clone(&position), args.split.clone());

@@ -75,6 +75,9 @@ pub(crate) struct SimulateArgs {
     /// Record the forces on colliders, anchors and fixed particles in each step, too (/forces)
     #[arg(long)]
     forces: bool,
+    /// Record the energy of each state in its row in /steps, too: kinetic, potential and elastic
+    #[arg(long)]
+    energy: bool,
     #[command(flatten)]
     threads: ThreadArgs,
     #[command(flatten)]
@@ -113,9 +116,9 @@ pub(crate) fn run(args: &SimulateArgs) -> anyhow::Result<Exit> {
             with_usage(&clap::Error::raw(ErrorKind::MissingRequiredArgument, text))
         }
         None if args.has_changes() => run_changed(args, &stop),
-        None if args.forces => {
-            let text = "--forces needs --steps, --drop, --set or --commands: a recording that is simulated without \
-                        changes keeps the forces that it has\n";
+        None if args.forces || args.energy => {
+            let text = "--forces and --energy need --steps, --drop, --set or --commands: a recording that is simulated \
+                        without changes keeps those that it has\n";
             with_usage(&clap::Error::raw(ErrorKind::MissingRequiredArgument, text))
         }
         None => run_recording(args, &stop),
@@ -297,6 +300,7 @@ fn begin(args: &SimulateArgs, path: &Path, job: &Job, solver: &Solver) -> anyhow
     let file = args.file.create(path)?;
     let selection = ContentSelection::default();
     let selection = if args.forces { selection.with_forces() } else { selection };
+    let selection = if args.energy { selection.with_energy() } else { selection };
     let options = LogOptions { selection, ..args.file.options() };
     let log = begin_log(file, options, &job.description(solver), &job.scene);
     log.with_context(|| truncation(args))

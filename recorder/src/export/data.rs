@@ -2,6 +2,7 @@
 
 mod colliders;
 pub(crate) mod csv;
+pub(crate) mod energy;
 mod faces;
 pub(crate) mod foxglove;
 pub(crate) mod npz;

@@ -107,6 +107,7 @@ pub struct LogWriter<W: Write> {
     /// Channel of each declared topic, in the order of [`Topic::ALL`].
     channels: Channels,
     encoder: MessageEncoder,
+    selection: ContentSelection,
     /// By collider. Empty until they are known.
     collider_details: Vec<ColliderDetails>,
     /// Newest time of reception. Log times never decrease.
@@ -146,6 +147,7 @@ impl<W: Write> LogWriter<W> {
                     run: run.clone(),
                     channels,
                     encoder: MessageEncoder::default(),
+                    selection: options.selection,
                     collider_details: Vec::new(),
                     log_time_ns,
                     snapshot_log_time_ns: None,
@@ -239,6 +241,11 @@ impl<W: Write> LogWriter<W> {
         self.stop_on_error(result)?;
         self.counts[topic].written += 1;
         Ok(())
+    }
+
+    /// Returns the declaration of the content that the caller leaves out, and of what it records on request.
+    pub fn selection(&self) -> &ContentSelection {
+        &self.selection
     }
 
     /// Returns the number of messages written so far, by topic. The other counts are 0.

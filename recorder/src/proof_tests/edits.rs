@@ -75,7 +75,7 @@ type Record = (u8, Vec<u8>);
 
 /// A recording with every topic.
 fn written() -> Vec<u8> {
-    written_with(ContentSelection::default().with_forces())
+    written_with(ContentSelection::default().with_forces().with_energy())
 }
 
 fn written_with(selection: ContentSelection) -> Vec<u8> {

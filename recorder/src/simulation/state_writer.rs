@@ -8,7 +8,7 @@ use crate::log::{
     constraint_state,
 };
 use sim_contract::{LoadHeader, Outcome, ParameterValues, ParticleState, Reason, Triangle};
-use sim_solver::{Applied, Scene, Solver};
+use sim_solver::{Applied, EnergyMeter, Scene, Solver};
 
 use super::frozen::{FrozenParticles, FrozenTracker};
 use super::job::Start;
@@ -55,6 +55,8 @@ pub(super) struct StateWriter {
     /// The last written values.
     parameters: Option<ParameterValues>,
     frozen: FrozenTracker,
+    /// None unless the recording has the energy of each state.
+    meter: Option<EnergyMeter>,
 }
 
 impl StateWriter {
@@ -87,6 +89,7 @@ impl StateWriter {
             colliders: CollidersRow { step: 0, colliders: Vec::new() },
             parameters: None,
             frozen: FrozenTracker::default(),
+            meter: log.selection().has_energy().then(|| EnergyMeter::of(solver)),
         })
     }
 
@@ -178,7 +181,8 @@ impl StateWriter {
         for row in self.frozen.new_events(step, FrozenParticles::find(particles)) {
             log.write(&Message::Event(row), time_ns)?;
         }
-        let row = StepRow { outcome_count: self.outcome_count, ..step_row(solver, step) };
+        let energy = self.meter.as_mut().map(|meter| meter.measure_solver(solver).into());
+        let row = StepRow { outcome_count: self.outcome_count, energy, ..step_row(solver, step) };
         log.write(&Message::Step(row), time_ns)?;
         let mut buffer = log.take_spare().unwrap_or_default();
         buffer.copy_from(particles);

@@ -93,6 +93,8 @@ pub(super) struct Verification {
     is_simulated: bool,
     pub(super) numbers: SnapshotNumbers,
     events: EventCheck,
+    /// The rows in /steps have the energy of their states.
+    has_energy: bool,
     run_id: RunId,
     /// The file has every command of its run.
     has_all_commands: bool,
@@ -128,6 +130,7 @@ impl Verification {
             is_simulated,
             numbers: SnapshotNumbers::new(is_simulated, has_numbers, selection),
             events: EventCheck::default(),
+            has_energy: selection.has_energy(),
             has_all_commands: false,
         })
     }
@@ -194,6 +197,10 @@ impl Verification {
         }
         if let Some(finding) = self.check_rows(frame) {
             return finding;
+        }
+        if frame.row.energy.is_some() != self.has_energy {
+            let what = "the metadata 'selection' and its row in /steps differ in whether energy was recorded";
+            return diverged(what.to_owned());
         }
         let what = self.numbers.check(&frame.row);
         let events = frozen.and_then(|frozen| self.check_events(frame, frozen));

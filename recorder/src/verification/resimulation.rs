@@ -5,12 +5,13 @@ use std::sync::atomic::AtomicBool;
 
 use crate::log::{Frame, Message, OutcomeRow, StepRow};
 use sim_contract::{Action, Outcome, ParticleState, RestoreContents};
-use sim_solver::{Applied, Control, Keyframe, Scene, Solver};
+use sim_solver::{Applied, Control, EnergyMeter, Keyframe, Scene, Solver};
 
 use super::finding::{SnapshotFinding, StepGap};
 use super::past_states::PastStates;
 use super::side_rows::SideRows;
 use super::state::{compare, has_other_tears};
+use crate::energy::EnergyRow;
 use crate::simulation::apply;
 
 /// The reason why a recording cannot be re-simulated.
@@ -57,6 +58,8 @@ pub struct Resimulation {
     is_in_gap: bool,
     /// Messages before the first state that do not describe it.
     earlier_count: usize,
+    /// Measures the states, if the recording has their energy.
+    meter: Option<EnergyMeter>,
 }
 
 impl Resimulation {
@@ -99,6 +102,7 @@ impl Resimulation {
             gaps: Vec::new(),
             is_in_gap: false,
             earlier_count: 0,
+            meter: None,
         }))
     }
 
@@ -144,7 +148,12 @@ impl Resimulation {
             return finding;
         }
         let loaded = self.loaded.take();
-        self.compare_first(frame, rows, loaded.as_ref())
+        match self.compare_first(frame, rows, loaded.as_ref()) {
+            SnapshotFinding::Identical => {
+                self.compare_energy(&frame.row).unwrap_or(SnapshotFinding::Identical)
+            }
+            different => different,
+        }
     }
 
     fn compare_first(
@@ -246,9 +255,10 @@ impl Resimulation {
             return self.misplaced(row.step, "its step is after the snapshot that counts it");
         }
         match compare(&self.solver, frame) {
-            SnapshotFinding::Identical => {
-                self.compare_side_rows().unwrap_or(SnapshotFinding::Identical)
-            }
+            SnapshotFinding::Identical => self
+                .compare_side_rows()
+                .or_else(|| self.compare_energy(row))
+                .unwrap_or(SnapshotFinding::Identical),
             // The torn constraints may differ. The rows name the first one.
             different @ SnapshotFinding::Diverged { difference: None, .. } => {
                 self.compare_side_rows().unwrap_or(different)
@@ -296,6 +306,17 @@ impl Resimulation {
         let step = self.step;
         let what = self.side_rows.compare(&self.solver, step)?;
         Some(SnapshotFinding::at_step(step, what))
+    }
+
+    /// Compares the energy of a state with the recorded one, if there is one.
+    fn compare_energy(&mut self, row: &StepRow) -> Option<SnapshotFinding> {
+        let recorded = row.energy?;
+        let meter = self.meter.get_or_insert_with(|| EnergyMeter::of(&self.solver));
+        let simulated = EnergyRow::from(meter.measure_solver(&self.solver));
+        (recorded != simulated).then(|| {
+            let what = format!("/steps: energy: recorded {recorded:?}, simulated {simulated:?}");
+            SnapshotFinding::at_step(row.step, what)
+        })
     }
 
     /// Adds the messages before a snapshot, once.

@@ -84,8 +84,15 @@ pub(crate) enum QueryVerb {
         parameter: Option<Parameter>,
     },
     /// Print the state of the node: scene, step, pace, times, losses
-    #[command(after_help = "Examples:\n  sim-node ctl status\n  sim-node ctl status --json")]
-    Status,
+    #[command(
+        after_help = "Examples:\n  sim-node ctl status\n  sim-node ctl status --energy --json"
+    )]
+    Status {
+        /// Print the energy of the newest state, too: kinetic, potential (-m g.x) and elastic, in J if the scene is in
+        /// metres, of the free particles and of the constraints and bends that are not torn
+        #[arg(long)]
+        energy: bool,
+    },
     /// Print the step and the state hash of the newest snapshot
     #[command(after_help = "Example: sim-node ctl hash --json")]
     Hash,

@@ -4,6 +4,7 @@ use anyhow::bail;
 use serde::Serialize;
 use sim_contract::{Client, MemberStatus, NodeStatus};
 
+use super::energy::EnergyRow;
 use crate::args::CtlArgs;
 use crate::output;
 
@@ -137,16 +138,27 @@ impl MemberRow {
     }
 }
 
-/// Prints the newest status.
-pub(super) fn print(client: &mut Client, args: &CtlArgs) -> anyhow::Result<()> {
+/// A status in JSON, with the energy if it was asked for.
+#[derive(Serialize)]
+struct Report {
+    #[serde(flatten)]
+    status: StatusRow,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    energy: Option<EnergyRow>,
+}
+
+/// Prints the newest status, and the energy of the newest state if it is asked for.
+pub(super) fn print(client: &mut Client, args: &CtlArgs, has_energy: bool) -> anyhow::Result<()> {
     let Some(status) = client.status(args.timeout())? else {
         bail!("the node published no status within {:?}; is it stopped?", args.timeout());
     };
-    let row = StatusRow::new(&status);
+    let energy = has_energy.then(|| EnergyRow::read(args)).transpose()?;
+    let report = Report { status: StatusRow::new(&status), energy };
     if args.json {
-        return output::json(&row);
+        return output::json(&report);
     }
-    for (key, value) in row.lines() {
+    let energy = report.energy.iter().map(|energy| ("energy", energy.text()));
+    for (key, value) in report.status.lines().into_iter().chain(energy) {
         output::line(&format!("{key:<14} {value}"))?;
     }
     Ok(())

@@ -1,6 +1,7 @@
 //! Stretch and energy of a state.
 
 use sim_contract::{ConstraintKind, ConstraintState, ParticleState, TornConstraint};
+use sim_solver::Energy;
 
 use crate::wire::convert::to_f32;
 
@@ -52,29 +53,14 @@ pub(crate) fn measure(
             (max, max_constraint) = (stretch, index);
         }
     }
-    let (kinetic_j, potential_j) = energies(particles, gravity);
+    let energy = Energy::of_particles(bytemuck::cast_slice(particles), gravity);
     Measures {
         stretch_mean: if count == 0 { f32::NAN } else { to_f32(sum / f64::from(count)) },
         stretch_max: if count == 0 { f32::NAN } else { to_f32(max) },
         stretch_max_constraint: max_constraint,
-        kinetic_j,
-        potential_j,
+        kinetic_j: energy.kinetic,
+        potential_j: energy.potential,
     }
-}
-
-fn energies(particles: &[ParticleState], gravity: [f32; 3]) -> (f64, f64) {
-    let (mut kinetic, mut potential) = (0.0, 0.0);
-    // A held particle has inverse mass 0; its mass is unknown.
-    for particle in particles.iter().filter(|particle| particle.inverse_mass > 0.0) {
-        let mass = 1.0 / f64::from(particle.inverse_mass);
-        kinetic += 0.5 * mass * dot(particle.velocity, particle.velocity);
-        potential -= mass * dot(gravity, particle.position);
-    }
-    (kinetic, potential)
-}
-
-fn dot(a: [f32; 3], b: [f32; 3]) -> f64 {
-    (0..3).map(|axis| f64::from(a[axis]) * f64::from(b[axis])).sum()
 }
 
 fn distance(a: [f32; 3], b: [f32; 3]) -> f64 {

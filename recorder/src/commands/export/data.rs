@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use crate::cli::output;
 use crate::export::data::written_files::WrittenFiles;
-use crate::export::data::{csv, foxglove, npz, obj, pc2, ros2, usda, vtk};
+use crate::export::data::{csv, energy, foxglove, npz, obj, pc2, ros2, usda, vtk};
 use crate::export::snapshots::Snapshots;
 
 /// A format of numbers or meshes.
@@ -16,6 +16,7 @@ use crate::export::snapshots::Snapshots;
 pub(super) enum DataFormat {
     Npz,
     Csv,
+    Energy,
     Vtk,
     Obj,
     Pc2,
@@ -34,7 +35,7 @@ impl DataFormat {
     pub(super) fn extensions(self) -> &'static [&'static str] {
         match self {
             Self::Npz => &["npz"],
-            Self::Csv => &["csv"],
+            Self::Csv | Self::Energy => &["csv"],
             Self::Pc2 => &["pc2"],
             Self::Usda => &["usda", "usd"],
             Self::Foxglove => &["mcap"],
@@ -91,6 +92,7 @@ fn write_files(
     match format {
         DataFormat::Npz => files.add_streamed(target, |out| npz::write(snapshots, out)),
         DataFormat::Csv => files.add_streamed(target, |out| csv::write(snapshots, out)),
+        DataFormat::Energy => files.add_streamed(target, |out| energy::write(snapshots, out)),
         DataFormat::Vtk => vtk::write(snapshots, target, files),
         DataFormat::Obj => obj::write(snapshots, target, files),
         DataFormat::Pc2 => pc2::write(snapshots, target, files),

@@ -26,6 +26,9 @@ pub(super) struct FormatArgs {
     /// Write a table with a row for each particle of each snapshot; `-` is stdout
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
+    /// Write a table of CSV with the energy of each snapshot in J: kinetic, potential, elastic and their sum; `-` is stdout
+    #[arg(long, value_name = "FILE")]
+    energy: Option<PathBuf>,
     /// Write VTP files and a PVD file with their times into this folder, for ParaView: velocity,
     /// inverse mass and flags of particles, stretch of untorn constraints, intact faces, colliders
     #[arg(long, value_name = "DIR")]
@@ -98,6 +101,7 @@ impl FormatArgs {
         let data = [
             (&self.npz, DataFormat::Npz),
             (&self.csv, DataFormat::Csv),
+            (&self.energy, DataFormat::Energy),
             (&self.vtk, DataFormat::Vtk),
             (&self.obj, DataFormat::Obj),
             (&self.pc2, DataFormat::Pc2),

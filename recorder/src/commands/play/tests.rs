@@ -55,6 +55,7 @@ fn frame(step: u64, updates: Vec<Message>) -> Frame {
         wake_late_ns: 6,
         solve_ns: 7,
         snapshot_index: Some(40),
+        energy: None,
     };
     let particle = ParticleState { position: [-0.0, step as f32, 0.0], ..Default::default() };
     Frame { updates, row, particles: Some(vec![particle; 2]), log_times_ns: Vec::new() }

@@ -1,11 +1,14 @@
 //! A copy of the state at which a recording can start.
 
+use recorder::EnergyRow;
 use sim_contract::{Change, KeyframeHeader, ParticleState, SnapshotHeader, State, TearsHeader};
 
 /// A copy of a state, with the changes that a recording from this state on begins with.
 #[derive(Debug)]
 pub(crate) struct FirstState {
     pub(crate) header: SnapshotHeader,
+    /// Its energy, if it was asked for.
+    pub(crate) energy: Option<EnergyRow>,
     pub(crate) particles: Vec<ParticleState>,
     /// Constraints that tore in earlier steps.
     pub(crate) torn_before: Vec<u32>,
@@ -33,6 +36,7 @@ impl FirstState {
         }
         let mut first = Self {
             header: *header,
+            energy: None,
             particles: state.particles.to_vec(),
             torn_before: before.iter().map(|torn| torn.constraint).collect(),
             changes,
@@ -71,7 +75,7 @@ impl FirstState {
 }
 
 /// Returns `true` if everything that belongs to a state, except its keyframe, has arrived.
-fn has_all_parts(state: &State<'_>) -> bool {
+pub(crate) fn has_all_parts(state: &State<'_>) -> bool {
     let State { header, torn, colliders, parameters, .. } = *state;
     torn.constraints.len() == header.torn_count as usize
         && torn.header.run_id == header.run_id

@@ -2,13 +2,14 @@
 
 mod started;
 
-use recorder::{AllCounts, Closing, Topic};
+use recorder::{AllCounts, Closing, EnergyRow, Topic};
 use sim_contract::{
     Change, LostChanges, NodeStatus, Outcome, ReadError, SnapshotFlags, SnapshotHeader, State,
 };
+use sim_solver::EnergyMeter;
 
 use super::accepted::{Accepted, RunEnd};
-use super::first_state::FirstState;
+use super::first_state::{FirstState, has_all_parts};
 use super::load::{Load, LoadError, Now};
 use super::messages::Messages;
 use started::{Passed, PreviousFile, Started};
@@ -51,6 +52,18 @@ pub(crate) struct Intake {
     follows_errors: bool,
     /// An error was reported, and the recording had started then.
     reported: Option<bool>,
+    has_energy: bool,
+    /// Measures the states of the load, if it was asked for.
+    meter: Option<EnergyMeter>,
+}
+
+/// Returns the energy of a state, if it was asked for. A state that lacks a part of it has none.
+fn measure(meter: &mut Option<EnergyMeter>, state: &State<'_>) -> Option<EnergyRow> {
+    if !has_all_parts(state) {
+        return None;
+    }
+    let (particles, torn) = (bytemuck::cast_slice(state.particles), state.torn.indices());
+    meter.as_mut()?.measure(particles, torn, &state.parameters.values).map(EnergyRow::from)
 }
 
 /// Snapshots that came before the first one that has its keyframe.
@@ -65,6 +78,11 @@ impl Intake {
     /// Accepts up to `steps_max` steps after the first one.
     pub(crate) fn new(steps_max: Option<u64>) -> Self {
         Self { steps_max, ..Self::default() }
+    }
+
+    /// Measures the energy of each state.
+    pub(crate) fn with_energy(self, has_energy: bool) -> Self {
+        Self { has_energy, ..self }
     }
 
     /// Accepts the next state of a tap.
@@ -83,11 +101,15 @@ impl Intake {
         }
         self.start_if_ready(now, accepted);
         if let Some(started) = &mut self.started {
-            started.accept(state.header, state.particles, state.changes, accepted);
+            let energy = measure(&mut self.meter, state);
+            let particles = state.particles;
+            started.accept((state.header, energy), particles, state.changes, accepted);
             return Ok(());
         }
         if matches!(state.changes.first(), Some(Change::Load)) {
-            self.load = Some(Load::new(state.load)?);
+            let load = Load::new(state.load)?;
+            self.meter = self.has_energy.then(|| load.energy_meter());
+            self.load = Some(load);
         }
         let first_outcome = self.first_outcome(state.header);
         self.outcomes.retain(|outcome| {
@@ -104,7 +126,8 @@ impl Intake {
         if state.header.snapshot_index == 0 && is_replay(state.header) {
             self.seen_replay = Some(state.header.run_id);
         }
-        self.candidate = FirstState::new(state);
+        let energy = measure(&mut self.meter, state);
+        self.candidate = FirstState::new(state).map(|first| FirstState { energy, ..first });
         if self.previous.is_none() {
             (self.unreadable, self.follows_errors) = (0, true);
         }
@@ -219,8 +242,8 @@ impl Intake {
         started.count_load(&header.rows);
         started.skip_member_changes(self.status.as_ref());
         accepted.header = Some(header);
-        let FirstState { header, particles, changes, .. } = first;
-        started.accept(&header, &particles, &changes, accepted);
+        let FirstState { header, energy, particles, changes, .. } = first;
+        started.accept((&header, energy), &particles, &changes, accepted);
         self.started = Some(started);
     }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use recorder::{Message, RunDescription, SceneColliders, SurfaceRow, TopologyRow};
 use sim_contract::clock::{monotonic_ns, realtime_ns};
 use sim_contract::{LoadHeader, LoadedScene, SnapshotHeader};
-use sim_solver::{Scene, SceneError};
+use sim_solver::{EnergyMeter, Scene, SceneError};
 
 /// The start of a file.
 #[derive(Debug, Clone, PartialEq)]
@@ -79,6 +79,11 @@ impl Load {
         let rate_hz = self.scene.solver.rate_hz;
         let since_ns = RunDescription::duration_ns(first.step, rate_hz);
         self.epoch_ns = epoch_ns.unwrap_or(published_ns.saturating_sub(since_ns));
+    }
+
+    /// Returns the measurement of the energy of its states.
+    pub(crate) fn energy_meter(&self) -> EnergyMeter {
+        EnergyMeter::new(&self.scene)
     }
 
     /// Returns the wall clock of step 0, in nanoseconds since 1970.

@@ -4,8 +4,10 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sim_contract::SnapshotHeader;
 
+use crate::energy::EnergyRow;
+
 /// The header of a recorded snapshot.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct StepRow {
     /// The snapshot is the state after this step.
     pub step: u64,
@@ -29,6 +31,9 @@ pub struct StepRow {
     /// left out are missing snapshots. Absent in recordings of format version 3 and earlier.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub snapshot_index: Option<u32>,
+    /// Energy of the state. Absent where it was not asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub energy: Option<EnergyRow>,
 }
 
 impl From<&SnapshotHeader> for StepRow {
@@ -43,6 +48,7 @@ impl From<&SnapshotHeader> for StepRow {
             wake_late_ns: header.wake_late_ns,
             solve_ns: header.solve_ns,
             snapshot_index: Some(header.snapshot_index),
+            energy: None,
         }
     }
 }

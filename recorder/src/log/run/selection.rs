@@ -16,22 +16,25 @@ const LEFT_OUT: &str = "left_out";
 const ONLY_COMMANDS: &str = "only_commands";
 /// Key of a recording of forces. Only such a recording has it.
 const FORCES: &str = "forces";
+/// Key of a recording of the energy of each state. Only such a recording has it.
+const ENERGY: &str = "energy";
 
 /// The topics and snapshots of a recording: metadata `selection`, before the metadata `run`. The default
-/// is everything but the forces, which are recorded only on request, and such a file has no such record.
+/// is everything but forces and energy, which are recorded only on request, and such a file has no such record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ContentSelection {
     every: NonZeroU32,
     /// In the order of [`Topic::ALL`].
     left_out: [bool; Topic::ALL.len()],
     is_only_commands: bool,
+    has_energy: bool,
 }
 
 impl Default for ContentSelection {
     fn default() -> Self {
         let mut left_out = [false; Topic::ALL.len()];
         left_out[Topic::Forces.index()] = true;
-        Self { every: NonZeroU32::MIN, left_out, is_only_commands: false }
+        Self { every: NonZeroU32::MIN, left_out, is_only_commands: false, has_energy: false }
     }
 }
 
@@ -85,6 +88,17 @@ impl ContentSelection {
     pub fn with_forces(mut self) -> Self {
         self.left_out[Topic::Forces.index()] = false;
         self
+    }
+
+    /// Adds the energy of each state to its row in /steps.
+    #[must_use]
+    pub fn with_energy(self) -> Self {
+        Self { has_energy: true, ..self }
+    }
+
+    /// Returns `true` if the rows in /steps have the energy of their states.
+    pub fn has_energy(&self) -> bool {
+        self.has_energy
     }
 
     /// Returns the selection of the same recording with the particles of all its snapshots.
@@ -173,6 +187,9 @@ impl ContentSelection {
         if self.has_topic(Topic::Forces) {
             map.insert(FORCES.to_owned(), true.to_string());
         }
+        if self.has_energy {
+            map.insert(ENERGY.to_owned(), true.to_string());
+        }
         map
     }
 
@@ -190,7 +207,8 @@ impl ContentSelection {
         let selection = Self::new(every, &topics.collect::<Option<Vec<_>>>()?);
         let selection =
             if is_set(map, ONLY_COMMANDS)? { selection.with_only_commands() } else { selection };
-        Some(if is_set(map, FORCES)? { selection.with_forces() } else { selection })
+        let selection = if is_set(map, FORCES)? { selection.with_forces() } else { selection };
+        Some(if is_set(map, ENERGY)? { selection.with_energy() } else { selection })
     }
 }
 
@@ -214,6 +232,7 @@ mod tests {
             every(7),
             every(1).with_only_commands(),
             every(7).with_forces(),
+            every(7).with_energy(),
         ] {
             assert_eq!(ContentSelection::from_map(&selection.to_map()), Some(selection));
         }
@@ -224,6 +243,7 @@ mod tests {
             ("left_out", "?"),
             ("only_commands", "no"),
             ("forces", "no"),
+            ("energy", "no"),
             ("left_out", "/forces"),
         ] {
             let mut map = every(2).to_map();

@@ -32,12 +32,16 @@ pub(crate) struct SelectionArgs {
     /// computes them only while a program reads them
     #[arg(long)]
     forces: bool,
+    /// Record the energy of each state in its row in /steps, too: kinetic, potential and elastic
+    #[arg(long)]
+    energy: bool,
 }
 
 impl Default for SelectionArgs {
     fn default() -> Self {
         let (topics, exclude) = (Vec::new(), Vec::new());
-        Self { topics, exclude, every: NonZeroU32::MIN, only_commands: false, forces: false }
+        let every = NonZeroU32::MIN;
+        Self { topics, exclude, every, only_commands: false, forces: false, energy: false }
     }
 }
 
@@ -49,6 +53,7 @@ impl SelectionArgs {
         let left_out: Vec<_> = ContentSelection::OPTIONAL.into_iter().filter(is_left_out).collect();
         let selection = ContentSelection::new(self.every, &left_out);
         let selection = if self.only_commands { selection.with_only_commands() } else { selection };
+        let selection = if self.energy { selection.with_energy() } else { selection };
         if self.forces || self.topics.contains(&Topic::Forces) {
             selection.with_forces()
         } else {

@@ -2,8 +2,8 @@
 
 use recorder::simulation::{FrozenParticles, FrozenTracker};
 use recorder::{
-    AllCounts, CollidersRow, EventRow, ForcesRow, Message, OutcomeRow, ParametersRow, StatusRow,
-    StepRow, TearsRow, Topic,
+    AllCounts, CollidersRow, EnergyRow, EventRow, ForcesRow, Message, OutcomeRow, ParametersRow,
+    StatusRow, StepRow, TearsRow, Topic,
 };
 use sim_contract::{
     Change, ColliderState, CollidersHeader, ForceRow, ForcesHeader, KeyframeHeader, LostChanges,
@@ -210,10 +210,10 @@ impl Started {
         }
     }
 
-    /// Accepts a state and the changes before it, unless the recording ends before it.
+    /// Accepts a state, its energy if it was asked for, and the changes before it, unless the recording ends before it.
     pub(super) fn accept(
         &mut self,
-        header: &SnapshotHeader,
+        (header, energy): (&SnapshotHeader, Option<EnergyRow>),
         particles: &[ParticleState],
         changes: &[Change],
         accepted: &mut Accepted,
@@ -236,7 +236,8 @@ impl Started {
         self.last = *header;
         self.counts[Topic::Steps].received += 1;
         self.counts[Topic::Particles].received += 1;
-        accepted.contents.push(Content::Snapshot(StepRow::from(header), buffer));
+        let row = StepRow { energy, ..StepRow::from(header) };
+        accepted.contents.push(Content::Snapshot(row, buffer));
         if header.step >= self.end_step {
             accepted.end = Some(RunEnd::EndStep);
         }

@@ -1,0 +1,58 @@
+//! The energy of the newest state, for `ctl status --energy`.
+
+use std::str;
+use std::time::Instant;
+
+use anyhow::{Context, bail};
+use bytemuck::cast_slice;
+use serde::Serialize;
+use sim_contract::{State, Tap};
+use sim_solver::{Energy, EnergyMeter, Scene};
+
+use crate::args::CtlArgs;
+
+/// The energy of a state in JSON, in J.
+#[derive(Debug, Serialize)]
+pub(super) struct EnergyRow {
+    /// The step of the state.
+    step: u64,
+    #[serde(flatten)]
+    energy: Energy,
+}
+
+impl EnergyRow {
+    /// Measures the newest state of the node.
+    pub(super) fn read(args: &CtlArgs) -> anyhow::Result<Self> {
+        let mut tap = Tap::attach(&args.endpoint.endpoint()?)?;
+        let deadline = Instant::now() + args.timeout();
+        loop {
+            if let Some(state) = tap.next_state(|_| {}) {
+                return Self::of(&state);
+            }
+            let left = deadline.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                bail!("the node published no state within {:?}; is it stopped?", args.timeout());
+            }
+            tap.wait(left);
+        }
+    }
+
+    fn of(state: &State<'_>) -> anyhow::Result<Self> {
+        let text = str::from_utf8(&state.load.scene).context("the scene of the node is no text")?;
+        let scene = Scene::from_toml(text, "scene").context("the scene of the node")?;
+        let (particles, values) = (cast_slice(state.particles), &state.parameters.values);
+        let energy = EnergyMeter::new(&scene).measure(particles, state.torn.indices(), values);
+        let energy = energy.context("the newest state is not one of the scene of the node")?;
+        Ok(Self { step: state.header.step, energy })
+    }
+
+    /// Text for people.
+    pub(super) fn text(&self) -> String {
+        let Self { step, energy } = self;
+        let Energy { kinetic, potential, elastic } = energy;
+        let total = energy.total();
+        format!(
+            "{total:.6} J in step {step}: {kinetic:.6} kinetic, {potential:.6} potential, {elastic:.6} elastic"
+        )
+    }
+}
