@@ -180,7 +180,8 @@ fn document() -> Table {
     let last = lines.each_ref().map(|lines| lines[lines.len() - 1]);
     Table::new(
         "print",
-        "the loop of a tutorial, while (time <= 10), with the print statement in two places",
+        "the loop of \"Verlet Integration and Cloth Physics Simulation\" (pikuma.com), while (time <= 10), with the \
+         print statement in two places",
     )
     .column(Column::new(Origin::Given, "printed", "where the loop prints").cells(["top", "bottom"]))
     .column(Column::new(Origin::Loop, "passes", "through the loop").cells([END_S + 1; 2]))

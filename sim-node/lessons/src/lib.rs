@@ -83,6 +83,20 @@ impl Lesson {
         }
     }
 
+    /// The tutorials that the lesson speaks of, with their sites where they have one.
+    pub fn tutorials(self) -> &'static [&'static str] {
+        match self {
+            Self::Euler | Self::F32 => {
+                &["\"Verlet Integration and Cloth Physics Simulation\", pikuma.com"]
+            }
+            Self::Iterations => &["\"A verlet integrator under 100 lines\", Motecraft"],
+            Self::Stiffness => {
+                &["\"Particle Simulator with Springs - Position Based Dynamics (PBD)\", 2026"]
+            }
+            Self::Dissipation => &[],
+        }
+    }
+
     /// Computes the tables of the lesson. This takes up to a few seconds in a debug build.
     pub fn tables(self) -> Vec<Table> {
         match self {
@@ -125,6 +139,16 @@ mod tests {
             assert_eq!(lesson.name().parse(), Ok(lesson));
         }
         assert_eq!("nix".parse::<Lesson>(), Err(UnknownLesson("nix".to_owned())));
+    }
+
+    #[test]
+    fn every_row_in_csv_has_every_column() {
+        for table in Lesson::ALL.into_iter().flat_map(Lesson::tables) {
+            let csv = table.to_csv();
+            let mut lines = csv.lines().skip(1).map(|line| line.split(',').count());
+            let columns = lines.next().unwrap();
+            assert!(lines.all(|cells| cells == columns), "{csv}");
+        }
     }
 
     #[test]

@@ -75,6 +75,15 @@ impl From<Option<f64>> for Cell {
 }
 
 impl Cell {
+    /// Returns the form in CSV: all digits, and nothing for no value. No word has a comma or a quote.
+    fn csv(self) -> String {
+        match self {
+            Self::Number(number) => format!("{number:?}"),
+            Self::Whole(_) | Self::Word(_) => self.text(0),
+            Self::Empty => String::new(),
+        }
+    }
+
     /// Returns the printed form.
     fn text(self, decimals: usize) -> String {
         match self {
@@ -159,6 +168,21 @@ impl Table {
     pub(crate) fn note(mut self, note: impl Into<String>) -> Self {
         self.notes.push(note.into());
         self
+    }
+
+    /// Returns the table as CSV with all digits, below a comment with its name and title.
+    pub fn to_csv(&self) -> String {
+        let names: Vec<_> = self.columns.iter().map(|column| column.name.to_owned()).collect();
+        let rows = (0..self.row_count()).map(|row| {
+            let cells = self.columns.iter().map(|column| column.cells[row].csv());
+            cells.collect::<Vec<_>>().join(",")
+        });
+        let mut text = format!("# {}: {}\n{}\n", self.name, self.title, names.join(","));
+        for row in rows {
+            text += &row;
+            text.push('\n');
+        }
+        text
     }
 
     fn row_count(&self) -> usize {
@@ -275,6 +299,12 @@ mod tests {
         assert_eq!(json["rows"], serde_json::from_str::<serde_json::Value>(rows).unwrap());
         assert_eq!(json["columns"][2]["origin"], "document");
         assert_eq!(json["columns"][0]["text"], "time, s");
+    }
+
+    #[test]
+    fn csv_has_a_comment_a_heading_and_all_digits() {
+        let csv = example().to_csv();
+        assert_eq!(csv, "# fall: two rows\nt,x,printed\n1,-0.001,2.5\n10,12.345,\n");
     }
 
     #[test]

@@ -12,6 +12,7 @@ use sim_lessons::{Lesson, UnknownLesson};
     Examples:\n  \
     sim-node lesson               list the lessons\n  \
     sim-node lesson euler         why one table ends at 450, one at 550, and one at 500\n  \
+    sim-node lesson f32 --csv     the rows, for a spreadsheet\n  \
     sim-node lesson f32 --json    the rows, for a plot"
 )]
 pub(crate) struct LessonArgs {
@@ -21,6 +22,9 @@ pub(crate) struct LessonArgs {
     /// Print an array of tables with columns, rows and notes as JSON
     #[arg(long)]
     pub(crate) json: bool,
+    /// Print the tables as CSV with all digits, each below a comment with its title
+    #[arg(long, conflicts_with = "json", requires = "lesson")]
+    pub(crate) csv: bool,
 }
 
 /// Parses the name of a lesson. The help lists the names with their summaries.

@@ -1,9 +1,10 @@
-//! The commands of the README's ten-minute paths work as printed, one after the other, in one folder,
+//! The commands of the README's ten-minute paths, and of the class on a pendulum, work as printed, one after the other, in one folder,
 //! beside a node as another path leaves it.
 
 use integration_tests::{Finished, Process, Program, Sandbox};
 
 const README: &str = include_str!("../../../README.md");
+const CLASS: &str = include_str!("../../../examples/pendulum/README.md");
 
 /// Runs the examples of the contract as the test has built them.
 const CARGO: &str = r#"cargo() {
@@ -21,7 +22,10 @@ struct TenMinutes {
 impl TenMinutes {
     fn new(heading: &str) -> Self {
         let (_, text) = README.split_once(&format!("\n## Ten minutes for {heading}\n")).unwrap();
-        let text = text.split("\n## ").next().unwrap();
+        Self::of(text.split("\n## ").next().unwrap())
+    }
+
+    fn of(text: &'static str) -> Self {
         let sandbox = Sandbox::new();
         let node = Process::start_ready(Program::SimNode, &sandbox, &["run", "pendulum"]);
         Self { text, _node: node, sandbox }
@@ -37,7 +41,10 @@ impl TenMinutes {
     fn run(&self) -> Vec<(&'static str, String)> {
         let lines = self.blocks("sh").flat_map(str::lines);
         let lines = lines.map(|line| line.split_once("  # ").unwrap_or((line, "")));
-        let lines = lines.filter(|(command, _)| !command.starts_with("python"));
+        // The node runs already, and nobody looks at a browser.
+        let others = ["python", "sim-node run", "viewer-bridge --open"];
+        let lines =
+            lines.filter(|(command, _)| !others.iter().any(|other| command.starts_with(other)));
         let mut recorder = None;
         let done = lines.map(|(command, comment)| {
             let command = command.trim_end();
@@ -134,4 +141,33 @@ fn the_path_for_teaching_checks_and_loads_the_printed_scene() {
     let done = path.run();
     assert!(printed(&done, "sim-node lesson euler").contains("500"));
     assert!(printed(&done, "sim-node check my.toml").starts_with("my: 402 particles, "));
+}
+
+#[test]
+fn the_class_on_a_pendulum_measures_what_its_page_says() {
+    let class = TenMinutes::of(CLASS);
+    let done = class.run();
+    assert!(printed(&done, "sim-node ctl status --energy").contains("J in step "));
+    let report = class.blocks("").next().unwrap();
+    assert_eq!(printed(&done, "recorder info swing.mcap --energy").trim_end(), report);
+    let rows = CLASS.lines().filter_map(|line| line.strip_prefix("| ")?.split_once(" | "));
+    let rows: Vec<_> = rows.filter(|(substeps, _)| substeps.parse::<u32>().is_ok()).collect();
+    assert_eq!(rows.len(), 4);
+    for (substeps, energy) in rows {
+        let file = if substeps == "20" { "swing".to_owned() } else { format!("swing_{substeps}") };
+        let report = printed(&done, &format!("recorder info {file}.mcap --energy"));
+        let last = report.lines().nth(2).unwrap();
+        let total: f64 = last.split_whitespace().last().unwrap().parse().unwrap();
+        assert!(energy.starts_with(&format!("{total:.3} J")), "{energy}: {last}");
+        // The bob can fall to 1 m below the pin.
+        let (start, lowest) = (-5.300_366, -9.81);
+        let lost = 100.0 * (start - total) / (start - lowest);
+        assert!(energy.ends_with(&format!("| {lost:.1} % |")), "{energy}: {lost} %");
+    }
+    let table = std::fs::read_to_string(class.sandbox.path("swing.csv")).unwrap();
+    let kinetic =
+        table.lines().skip(1).map(|line| line.split(',').nth(2).unwrap().parse().unwrap());
+    let largest: f64 = kinetic.fold(0.0, f64::max);
+    assert!(CLASS.contains(&format!("The largest\n`kinetic_j` is {largest:.3} J")), "{largest}");
+    assert!(printed(&done, "sim-node lesson dissipation --csv").contains("\nsubsteps,from_1,"));
 }
