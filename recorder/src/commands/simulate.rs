@@ -191,6 +191,7 @@ fn run_scene(args: &SimulateArgs, steps: u64, stop: &Stop) -> anyhow::Result<Exi
     if let (Some(warning), Some(source)) = (warning_of_late_commands(&job), &args.commands) {
         output::note(&format!("warning: {}: {warning}", printable_line(source)));
     }
+    job.scene.check_memory()?;
     let solver = Solver::new(&job.scene);
     run_job(args, &job, States::first(solver), stop)
 }

@@ -9,6 +9,7 @@
 pub(crate) mod definition;
 mod error;
 mod generate;
+mod memory;
 mod mesh;
 pub(crate) mod model;
 mod poses;
@@ -36,6 +37,7 @@ pub use generate::ragdoll::Ragdoll;
 pub use generate::rope::Rope;
 pub use generate::web::Web;
 pub use generate::{Generator, Shape};
+pub use memory::NotEnoughMemory;
 pub use mesh::details::{FaceDetails, NameRun};
 pub use mesh::pins::check_pin_expression;
 pub use mesh::{Mesh, ParsedMesh};

@@ -123,6 +123,28 @@ fn a_limit_on_the_size_of_files_ends_an_export_with_the_name_of_the_output() {
     assert!(finished.stderr.contains("; nothing of it was written: "), "{finished:?}");
 }
 
+#[test]
+fn a_scene_beyond_the_memory_of_the_process_is_refused_with_a_sentence() {
+    let sandbox = Sandbox::new();
+    let text = "version = 1\n[[generate]]\nshape = \"cloth\"\ncolumns = 1900\nrows = 1900\nspacing = 0.01\n";
+    let scene = sandbox.write("large.toml", text);
+    // 600 MiB of addresses for each.
+    let limit = ("-v", 600 << 10);
+    let simulation = ["simulate", &scene, "--steps", "1"];
+    for (program, args) in [
+        (Program::Recorder, &simulation[..]),
+        (Program::SimNode, &["run", &scene, "--name", "large"]),
+    ] {
+        let finished = Process::start_limited(limit, program, &sandbox, args).wait();
+        assert_eq!(finished.code, Some(1), "{finished:?}");
+        let error = finished.stderr.lines().last().unwrap_or_default();
+        let (start, needed) = error.split_once("takes about ").unwrap();
+        assert!(start.starts_with("error: ") && start.contains("not enough memory"), "{error}");
+        let needed: u64 = needed.split(' ').next().unwrap().parse().unwrap();
+        assert!((1000..2000).contains(&needed), "{error}");
+    }
+}
+
 /// Asserts that a program failed at the limit, and left the readable part of its recording.
 fn assert_ended_at_the_limit(finished: &Finished, file: &str) {
     assert_eq!(finished.code, Some(1), "{}", finished.stderr);

@@ -45,6 +45,9 @@ pub(super) fn load(
     scene
         .override_solver(overrides.rate_hz, overrides.substeps)
         .map_err(|problem| Refusal { problem, reason })?;
+    scene
+        .check_memory()
+        .map_err(|error| Refusal { problem: error.to_string(), reason: Reason::NoEffectHere })?;
     let begins_run = scene.solver.rate_hz != rate_hz;
     let solver = if begins_run { Solver::new(&scene) } else { Solver::new_in_run(&scene) };
     let messages = LoadMessages::new(&scene, &solver);
