@@ -112,6 +112,8 @@ fn prepared_constraints_change_no_bit() {
         set(Parameter::MaxStretch, 1.2),
         Action::Reset,
         set(Parameter::WindDrag, 0.3),
+        Action::Pin { particle: 400 },
+        Action::Unpin { particle: 27 },
     ];
     let mut torn_counts = Vec::new();
     for (round, action) in actions.iter().cycle().take(60).enumerate() {
@@ -354,13 +356,19 @@ fn nothing_is_planned_for_commands_that_are_cheap_or_wrong() {
         collider: None,
     };
     assert!(solver.plan([action("compliance", 1e-3)]).is_some());
+    // The tethers of another pin.
+    assert!(solver.plan([Action::Pin { particle: 1 }]).is_some());
+    let without_tethers = self::solver(&SCENE.replace("tethers = true", ""));
+    assert!(without_tethers.plan([Action::Pin { particle: 1 }]).is_none());
     for action in [
         action("compliance", -1.0),
         action("compliance", f32::NAN),
         action("stiffness", 0.5),
         action("unknown", 0.5),
         action("damping", 0.5),
-        Action::Pin { particle: 1 },
+        Action::Pin { particle: 0 },
+        Action::Pin { particle: u32::MAX },
+        Action::Unpin { particle: 1 },
         Action::Reset,
     ] {
         assert!(solver.plan([action]).is_none(), "{action:?}");

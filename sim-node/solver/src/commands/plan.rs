@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use sim_types::Action;
+use sim_types::{Action, ParticleFlags};
 
 use super::preparation::{Plan, Prepared, Spare};
-use crate::constraints::tethers::TetherBasis;
+use crate::constraints::tethers::{TetherBasis, is_root};
 use crate::contacts::pairs::ParticleContacts;
 use crate::parameters::{Affected, Parameters, Target};
 use crate::solver::Solver;
@@ -18,7 +18,7 @@ const CONSTRAINTS_MIN: usize = 2000;
 const CONTACTS_MIN: usize = 500;
 
 impl Solver {
-    /// Returns the work that makes a reset, or settings that follow each other, cheap. None if they are
+    /// Returns the work that makes a reset, a pin, or settings that follow each other, cheap. None if they are
     /// cheap already, if [`Self::apply`] rejects them, and for other actions.
     pub fn plan(&self, actions: impl IntoIterator<Item = Action>) -> Option<Plan> {
         let (mut parameters, mut affected) = (self.parameters.clone(), Affected::Nothing);
@@ -28,6 +28,8 @@ impl Solver {
                     let basis = self.settings.has_tethers().then(|| self.initial_tether_basis());
                     return self.plan_for(&self.initial_parameters, &[], basis);
                 }
+                Action::Pin { particle } => return self.plan_pin(particle, true),
+                Action::Unpin { particle } => return self.plan_pin(particle, false),
                 Action::Set { parameter, value, constraint_kind, block, collider } => {
                     let target = Target::new(constraint_kind, block, collider);
                     // A rejected setting changes nothing.
@@ -45,6 +47,21 @@ impl Solver {
             Affected::Nothing => None,
             _ => self.plan_for(&parameters, self.torn(), tether_basis),
         }
+    }
+
+    /// The tethers after a particle was pinned or unpinned.
+    fn plan_pin(&self, particle: u32, is_pinned: bool) -> Option<Plan> {
+        let index = self.find_unfrozen(particle).ok().filter(|_| self.settings.has_tethers())?;
+        let before = self.particles.states[index].flags;
+        let pinned = if is_pinned { ParticleFlags::PINNED } else { 0 };
+        let after = before & !ParticleFlags::PINNED | pinned;
+        let mut basis = (before != after).then(|| self.tether_basis())?;
+        basis.roots.retain(|root| *root != particle);
+        if is_root(after) {
+            let place = basis.roots.partition_point(|root| *root < particle);
+            basis.roots.insert(place, particle);
+        }
+        self.plan_for(&self.parameters, self.torn(), Some(basis))
     }
 
     /// Returns the work that makes [`Self::restore`] and [`Self::put_in_place`] cheap; None if they are
@@ -65,8 +82,8 @@ impl Solver {
         let has_tethers = tether_basis
             .as_ref()
             .is_none_or(|basis| self.tethers.are_derived_from(parameters, basis));
-        let has_constraints = has_tethers && self.store.is_derived_from(parameters);
-        if (has_constraints || self.constraint_count() < CONSTRAINTS_MIN)
+        let has_constraints = self.store.is_derived_from(parameters);
+        if (has_constraints && has_tethers || self.constraint_count() < CONSTRAINTS_MIN)
             && (has_contacts || self.particle_count() < CONTACTS_MIN)
         {
             return None;
@@ -80,7 +97,7 @@ impl Solver {
             parameters: parameters.clone(),
             has_new_constraints: !has_constraints,
             torn: torn.to_vec(),
-            tether_basis,
+            tether_basis: tether_basis.filter(|_| !has_tethers),
             contact_mode: (!has_contacts).then_some(self.contact_mode),
         })
     }

@@ -27,7 +27,7 @@ pub struct Plan {
     pub(super) setup: Setup,
     pub(super) fields: SceneFields,
     pub(super) parameters: Parameters,
-    /// True if the constraints or the tethers change, false if only the contacts do.
+    /// True if the constraints change, false if only the tethers or the contacts do.
     pub(super) has_new_constraints: bool,
     /// In any order.
     pub(super) torn: Vec<u32>,
@@ -56,13 +56,12 @@ impl Plan {
     pub fn prepare(self, spare: Option<Spare>) -> Prepared {
         let spare = spare.filter(|Spare(spare)| Arc::ptr_eq(&spare.model, &self.model));
         let mut store = spare.and_then(|Spare(spare)| spare.store);
-        let mut tethers = Tethers::default();
         if self.has_new_constraints {
             self.configure(store.get_or_insert_with(|| self.new_store()));
-            let new_tethers =
-                |basis| Tethers::new(&self.model, &self.parameters, basis, self.fields.tethers);
-            tethers = self.tether_basis.clone().map(new_tethers).unwrap_or_default();
         }
+        let new_tethers =
+            |basis| Tethers::new(&self.model, &self.parameters, basis, self.fields.tethers);
+        let tethers = self.tether_basis.clone().map(new_tethers).unwrap_or_default();
         let particle_contacts = self.contact_mode.map(|mode| {
             let thickness = self.parameters.contact_thickness;
             ParticleContacts::new(&self.model, mode, thickness, self.kernels)
