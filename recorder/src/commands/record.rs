@@ -144,7 +144,7 @@ fn names(args: &RecordArgs, endpoint: &Endpoint) -> anyhow::Result<(FileNames, V
         return names.after_ring();
     }
     if is_black_box {
-        return Ok((names.after_earlier_files().0, Vec::new()));
+        return Ok((names.after_earlier_files()?.0, Vec::new()));
     }
     let count = names.check(args.file.existing())?;
     if count > 0 {

@@ -5,10 +5,16 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::bail;
-use recorder::{Existing, PartFileError, counted};
+use recorder::{Existing, LogReader, PartFileError, ReadError, counted};
 use sim_contract::is_being_written;
 
 use crate::cli::output;
+
+/// Largest number of a file: a file each second for 31 years. Names with larger numbers are not ours.
+const NUMBER_MAX: u64 = 1_000_000_000;
+/// Largest distance between the numbers of two files that follow each other, because other programs move files
+/// away: a file each second for 11 days.
+const NUMBER_DISTANCE_MAX: u64 = 1_000_000;
 
 /// The names of the files of a recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -36,82 +42,114 @@ impl FileNames {
         matches!(self, Self::Single(_))
     }
 
-    /// Numbers the files after those that are in the folder. Returns those, oldest first.
-    pub(crate) fn after_earlier_files(mut self) -> (Self, Vec<PathBuf>) {
+    /// Numbers the files after the numbered files in the folder. Returns those files, oldest first.
+    ///
+    /// # Errors
+    /// If the numbers in the folder are too far apart to be those of one series.
+    pub(crate) fn after_earlier_files(mut self) -> anyhow::Result<(Self, Vec<PathBuf>)> {
         let earlier = self.earlier_files();
-        let last = earlier.last().and_then(|path| self.number_of(path));
-        if let Self::Numbered { first, .. } = &mut self {
-            *first = last.map_or(0, |last| last.saturating_add(1));
+        for pair in earlier.windows(2) {
+            let [(before, _), (after, path)] = pair else { continue };
+            if after - before > NUMBER_DISTANCE_MAX {
+                let path = output::path_text(path);
+                bail!(
+                    "{path}: its number is too far from {before}, the one before it; move this file, or choose \
+                     another name with -o"
+                );
+            }
         }
-        (self, earlier)
+        if let (Self::Numbered { first, .. }, Some((last, _))) = (&mut self, earlier.last()) {
+            *first = last + 1;
+        }
+        Ok((self, earlier.into_iter().map(|(_, path)| path).collect()))
     }
 
-    /// Numbers the files of a ring after those of earlier recordings, and returns these.
+    /// Numbers the files of a ring after the numbered files in the folder. Returns the recordings among those
+    /// files, oldest first: the ring removes them.
+    ///
+    /// # Errors
+    /// If another recorder is writing one of the files, or if their numbers are too far apart.
     pub(crate) fn after_ring(self) -> anyhow::Result<(Self, Vec<PathBuf>)> {
-        let (names, earlier) = self.after_earlier_files();
+        let (names, earlier) = self.after_earlier_files()?;
         if let Some(path) = earlier.iter().find(|path| is_being_written(path)) {
             let path = path.display();
             bail!(
                 "{path} is being written by another recorder; end it, or choose another name with -o"
             );
         }
-        if let Some(last) = earlier.last() {
-            let (files, last) = (counted(earlier.len() as u64, "earlier file"), last.display());
+        let (ring, others): (Vec<_>, Vec<_>) =
+            earlier.into_iter().partition(|path| is_recording(path));
+        for path in others {
+            let path = output::path_text(&path);
+            output::note(&format!("warning: {path} is not a recording, so the ring keeps it"));
+        }
+        if let Some(last) = ring.last() {
+            let (files, last) = (counted(ring.len() as u64, "earlier file"), last.display());
             output::note(&format!("the ring goes on after {last}, with {files}"));
         }
-        Ok((names, earlier))
+        Ok((names, ring))
     }
 
     /// Returns the path of a file, counted from 0.
     pub(crate) fn path(&self, number: u64) -> PathBuf {
         match self {
             Self::Single(path) => path.clone(),
-            Self::Numbered { path, first } => {
-                let (stem, extension) = split_name(path);
-                let mut name = stem;
-                name.push(format!("_{:04}{extension}", first + number));
-                path.with_file_name(name)
-            }
+            Self::Numbered { path, first } => numbered_path(path, first + number),
         }
     }
 
-    /// Checks that the first file may be created, and that no numbered file of an earlier recording is
-    /// there: its files would be taken for those of this one. Returns the number of those that `existing`
-    /// allows.
+    /// Checks that the first file may be created, and that the folder has no numbered file of an earlier
+    /// recording, which would be taken for a file of this one, unless `existing` allows it. Returns the number
+    /// of such files.
     pub(crate) fn check(&self, existing: Existing) -> Result<usize, PartFileError> {
         existing.check(&self.path(0))?;
         let earlier = self.earlier_files();
         match earlier.first() {
-            Some(path) if existing == Existing::Refuse => {
+            Some((_, path)) if existing == Existing::Refuse => {
                 Err(PartFileError::Exists(path.to_owned()))
             }
             _ => Ok(earlier.len()),
         }
     }
 
-    /// Returns the numbered files, finished or not, that are in the folder, by their numbers. A folder that cannot be
-    /// read is reported when a file is created.
-    fn earlier_files(&self) -> Vec<PathBuf> {
+    /// Returns the numbered files in the folder, finished or not, in the order of their numbers. A folder that
+    /// cannot be read is reported when a file is created.
+    fn earlier_files(&self) -> Vec<(u64, PathBuf)> {
         let Self::Numbered { path, .. } = self else { return Vec::new() };
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
         let entries = fs::read_dir(folder.unwrap_or(Path::new("."))).into_iter().flatten();
         let names = entries.flatten().map(|entry| path.with_file_name(entry.file_name()));
-        let numbered = names.filter_map(|path| Some((self.number_of(&path)?, path)));
-        let mut files: Vec<_> = numbered.collect();
+        let mut files: Vec<_> =
+            names.filter_map(|path| Some((self.number_of(&path)?, path))).collect();
         files.sort_unstable();
-        files.into_iter().map(|(_, path)| path).collect()
+        files
     }
 
-    /// Returns the number in the name of a file of this recording, finished or not.
+    /// Returns the number of a file of this recording, finished or not. Its name must be spelled exactly as
+    /// [`FileNames::path`] does.
     fn number_of(&self, file: &Path) -> Option<u64> {
         let Self::Numbered { path, .. } = self else { return None };
-        let (stem, extension) = split_name(path);
-        let (name, stem) = (file.file_name()?.to_str()?, stem.to_str()?);
-        let name = name.strip_suffix(".part").unwrap_or(name);
-        let number = name.strip_suffix(extension)?.strip_prefix(stem)?.strip_prefix('_')?;
-        let is_number = number.len() >= 4 && number.bytes().all(|byte| byte.is_ascii_digit());
-        number.parse().ok().filter(|_| is_number)
+        let is_part = file.extension().is_some_and(|extension| extension == "part");
+        let name = if is_part { file.file_stem() } else { file.file_name() }?;
+        let (_, extension) = split_name(path);
+        let text = name.to_string_lossy();
+        let (_, digits) = text.strip_suffix(extension)?.rsplit_once('_')?;
+        let number = digits.parse().ok().filter(|number| *number <= NUMBER_MAX)?;
+        (numbered_path(path, number).file_name() == Some(name)).then_some(number)
     }
+}
+
+/// Returns the path of the file with a number in its name.
+fn numbered_path(path: &Path, number: u64) -> PathBuf {
+    let (mut name, extension) = split_name(path);
+    name.push(format!("_{number:04}{extension}"));
+    path.with_file_name(name)
+}
+
+/// Returns `true` for a recording, finished or not, of any format, and for an empty file, which a recorder
+/// leaves that is killed within its first second.
+fn is_recording(path: &Path) -> bool {
+    matches!(LogReader::open(path), Ok(_) | Err(ReadError::Version { .. } | ReadError::Empty))
 }
 
 /// Splits a name before `.mcap`. Any other ending belongs to the name.
@@ -143,7 +181,17 @@ mod tests {
         {
             assert_eq!(names.number_of(Path::new(name)), Some(number), "{name}");
         }
-        for name in ["run.mcap", "run_1.mcap", "run_00a0.mcap", "run_0000.txt", "rerun_0000.mcap"] {
+        for name in [
+            "run.mcap",
+            "run_1.mcap",
+            "run_00012.mcap",
+            "run_+001.mcap",
+            "run_00a0.mcap",
+            "run_0000.txt",
+            "run_0000.mcap.part.part",
+            "rerun_0000.mcap",
+            "run_4000000000.mcap",
+        ] {
             assert_eq!(names.number_of(Path::new(name)), None, "{name}");
         }
     }

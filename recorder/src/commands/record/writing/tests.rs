@@ -110,7 +110,8 @@ fn a_ring_goes_on_over_restarts_and_removes_the_files_of_earlier_recordings_firs
     let folder = Folder::new("restarted");
     drop(full_ring(&folder));
     fs::rename(folder.0.join("run_0001.mcap"), folder.0.join("run_9999.mcap")).unwrap();
-    fs::write(folder.0.join("run_10000.mcap.part"), "of a killed recorder").unwrap();
+    let of_killed_recorder = folder.0.join("run_10000.mcap.part");
+    fs::copy(folder.0.join("run_0000.mcap"), of_killed_recorder).unwrap();
     fs::write(folder.0.join("other_0000.mcap"), "of another recording").unwrap();
     let names = FileNames::numbered(folder.0.join("run.mcap"));
     let (names, earlier) = names.after_ring().unwrap();
@@ -120,6 +121,37 @@ fn a_ring_goes_on_over_restarts_and_removes_the_files_of_earlier_recordings_firs
     assert_eq!(files.written.removed_count, 2);
     write_files(&mut files, 1);
     assert_eq!(names_in(&folder), ["other_0000.mcap", "run_10001.mcap", "run_10002.mcap"]);
+}
+
+#[test]
+fn a_ring_keeps_files_of_other_programs_that_have_its_names() {
+    let folder = Folder::new("others");
+    drop(full_ring(&folder));
+    fs::write(folder.0.join("run_0002.mcap"), "not a recording").unwrap();
+    fs::rename(folder.0.join("run_0000.mcap"), folder.0.join("run_00003.mcap")).unwrap();
+    let names = FileNames::numbered(folder.0.join("run.mcap"));
+    let (names, earlier) = names.after_ring().unwrap();
+    assert_eq!(earlier, [folder.0.join("run_0001.mcap")]);
+    write_files(&mut ring(names, earlier), 2);
+    let expected = ["run_00003.mcap", "run_0002.mcap", "run_0003.mcap", "run_0004.mcap"];
+    assert_eq!(names_in(&folder), expected);
+}
+
+#[test]
+fn a_series_whose_numbers_are_far_apart_is_refused() {
+    let folder = Folder::new("apart");
+    drop(full_ring(&folder));
+    let after = |number: u64| {
+        let path = folder.0.join(format!("run_{number}.mcap"));
+        fs::copy(folder.0.join("run_0001.mcap"), &path).unwrap();
+        let result = FileNames::numbered(folder.0.join("run.mcap")).after_ring();
+        fs::remove_file(path).unwrap();
+        result.map(|(names, _)| names.path(0))
+    };
+    let error = after(20_240_101).unwrap_err().to_string();
+    assert!(error.contains("run_20240101.mcap: its number is too far from 1"), "{error}");
+    // Such a number is no number of ours.
+    assert_eq!(after(4_000_000_000).unwrap(), folder.0.join("run_0002.mcap"));
 }
 
 #[test]
