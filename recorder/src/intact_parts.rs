@@ -1,10 +1,10 @@
-//! A damaged recording as its repair would be: behind damage, readers see what a repair saves.
+//! Reads a damaged recording as its repair would be, so that readers see what a repair saves behind the damage.
 
 use std::fs::File;
 use std::io::{self, BufReader, BufWriter, PipeReader, Read};
 use std::path::Path;
 use std::sync::Arc;
-use std::thread;
+use std::thread::{self, JoinHandle};
 
 use sim_contract::{LoadHeader, Stop, Triangle};
 use sim_solver::{Scene, Solver};
@@ -52,17 +52,16 @@ impl IntactParts {
     ///
     /// # Errors
     /// If the operating system reports an error.
-    pub fn bytes(&self) -> io::Result<PipeReader> {
-        let (reader, writer) = io::pipe()?;
+    pub fn bytes(&self) -> io::Result<RepairedBytes> {
+        let (pipe, writer) = io::pipe()?;
         let source = SharedFile::new(Arc::clone(&self.file));
         let (load, stop) = (self.load.clone(), self.stop.clone());
         let repair = move || {
             let out = BufWriter::with_capacity(BUFFER_SIZE_BYTES, writer);
-            // The reader sees that the bytes end, and may also need no more of them.
-            let _repaired = repair_file(source, out, load, Some(&stop), &mut |_, _| {});
+            repair_file(source, out, load, Some(&stop), &mut |_, _| {}).map(drop)
         };
-        thread::Builder::new().name("repair".to_owned()).spawn(repair)?;
-        Ok(reader)
+        let repair = thread::Builder::new().name("repair".to_owned()).spawn(repair)?;
+        Ok(RepairedBytes { pipe, repair: Some(repair) })
     }
 
     /// Reads the repaired recording from its start.
@@ -71,6 +70,31 @@ impl IntactParts {
     /// If the operating system reports an error.
     pub fn reader(&self) -> Result<LogReader<impl Read + Send + use<>>, ReadError> {
         LogReader::new(BufReader::with_capacity(BUFFER_SIZE_BYTES, self.bytes()?))
+    }
+}
+
+/// The bytes of a repaired recording, which a thread repairs as they are read.
+#[derive(Debug)]
+pub struct RepairedBytes {
+    pipe: PipeReader,
+    repair: Option<JoinHandle<Result<(), RepairError>>>,
+}
+
+impl Read for RepairedBytes {
+    /// At the end of the bytes, returns the error of the repair, if there is one.
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let count = self.pipe.read(buffer)?;
+        if count == 0
+            && !buffer.is_empty()
+            && let Some(repair) = self.repair.take()
+        {
+            let repaired = repair.join().map_err(|_| io::Error::other("the repair panicked"))?;
+            repaired.map_err(|error| match error {
+                RepairError::Read(error) => error.into(),
+                error @ RepairError::Write(_) => io::Error::other(error),
+            })?;
+        }
+        Ok(count)
     }
 }
 
@@ -98,4 +122,52 @@ pub fn load_rows(report: &RepairReport) -> Option<LoadRows> {
         topology: TopologyRow { torn: lost.torn.clone(), ..topology },
         surface: SurfaceRow::new(&header, &triangles),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+    use std::sync::atomic::{AtomicBool, Ordering};
+
+    use sim_solver::builtin;
+
+    use super::*;
+    use crate::log::{Closing, LogOptions, LogWriter};
+    use crate::simulation::{Job, States, simulate};
+
+    /// Writes a recording into a file without a name.
+    fn recording(name: &str) -> IntactParts {
+        let scene = Scene::from_toml(builtin::text("drape").unwrap(), "drape").unwrap();
+        let (job, solver) = (Job::new(scene.clone(), Vec::new(), 3), Solver::new(&scene));
+        let (run, text) = (job.description(&solver), scene.to_toml());
+        let options = LogOptions::default();
+        let mut log = LogWriter::create(Vec::new(), options, &run, text.as_bytes(), 0).unwrap();
+        let is_stopped = AtomicBool::new(false);
+        simulate(&job, States::first(solver), Some(&mut log), &is_stopped, |_| {}).unwrap();
+        let path = std::env::temp_dir().join(format!("intact-parts-{name}-{}", std::process::id()));
+        fs::write(&path, log.finish(&Closing::default()).unwrap()).unwrap();
+        let parts = IntactParts::find(&path, &Stop::install().unwrap());
+        fs::remove_file(path).unwrap();
+        parts.unwrap()
+    }
+
+    #[test]
+    fn a_signal_ends_the_repaired_bytes_as_it_ends_every_read() {
+        let parts = recording("signal");
+        assert_eq!(parts.last_step(), Some(3));
+        assert!(parts.bytes().unwrap().read_to_end(&mut Vec::new()).unwrap() > 0);
+        parts.stop.flag().store(true, Ordering::Relaxed);
+        let error = parts.bytes().unwrap().read_to_end(&mut Vec::new()).unwrap_err();
+        assert!(matches!(ReadError::from(error), ReadError::Interrupted));
+        assert!(matches!(parts.reader().map(drop), Err(ReadError::Interrupted)));
+    }
+
+    /// The operating system reads no bytes of a folder.
+    #[test]
+    fn an_error_of_the_disk_ends_the_repaired_bytes() {
+        let folder = File::open(std::env::temp_dir()).unwrap();
+        let parts = IntactParts { file: Arc::new(folder), ..recording("disk") };
+        let error = parts.bytes().unwrap().read_to_end(&mut Vec::new()).unwrap_err();
+        assert_eq!(error.kind(), io::ErrorKind::IsADirectory);
+    }
 }

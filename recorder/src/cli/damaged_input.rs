@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-use anyhow::anyhow;
+use anyhow::{Context, anyhow};
 use recorder::{FindStateError, IntactParts, LogEnd, ReadError, RepairError};
 use sim_contract::{Stop, is_being_written};
 
@@ -39,7 +39,8 @@ impl fmt::Display for DamagedInput {
     }
 }
 
-/// Returns the error of a recording that lacks something, which its end explains unless it is complete.
+/// Returns the error of a recording that lacks something. The end of its readable part explains `problem`, unless
+/// the file is complete.
 pub(crate) fn lacks(path: &Path, problem: &str, end: Option<&LogEnd>) -> anyhow::Error {
     match end {
         None | Some(LogEnd::Complete) => anyhow!("{problem}"),
@@ -50,8 +51,8 @@ pub(crate) fn lacks(path: &Path, problem: &str, end: Option<&LogEnd>) -> anyhow:
     }
 }
 
-/// Returns what is intact of a recording whose readable part has an end that is not that of the file, if
-/// `saves_more` than that part.
+/// Returns the intact parts of a recording that is readable up to `end`. Returns `None` if that is the end of
+/// the file, if no repair is possible, or if `saves_more` says that the parts have no more than the readable part.
 pub(crate) fn intact_parts(
     path: &Path,
     end: &LogEnd,
@@ -63,8 +64,9 @@ pub(crate) fn intact_parts(
     }
     match IntactParts::find(path, stop) {
         Ok(parts) => Ok(Some(parts).filter(saves_more)),
-        Err(RepairError::Read(error @ ReadError::Interrupted)) => Err(error.into()),
-        // Then the readable part is all.
+        Err(error @ RepairError::Read(ReadError::Interrupted | ReadError::Io(_))) => {
+            Err(error).with_context(|| path.display().to_string())
+        }
         Err(_) => Ok(None),
     }
 }

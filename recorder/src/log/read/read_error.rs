@@ -166,3 +166,13 @@ impl From<io::Error> for ReadError {
         if let Some(Interrupted) = cause { Self::Interrupted } else { Self::Io(error) }
     }
 }
+
+impl From<ReadError> for io::Error {
+    fn from(error: ReadError) -> Self {
+        match error {
+            ReadError::Io(error) => error,
+            ReadError::Interrupted => Self::other(Interrupted),
+            other => Self::other(other),
+        }
+    }
+}
