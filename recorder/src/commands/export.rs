@@ -27,7 +27,6 @@ use crate::cli::file_args::{OverwriteArgs, refuse_own_input};
 use crate::cli::output::{self, AsJson};
 use crate::cli::parse::{self, whole_number_in};
 use crate::cli::progress::{progress_bar, progress_bytes};
-use crate::export::data::written_files::is_stdout;
 use crate::export::frame_names::FrameNames;
 use crate::export::pictures::target::Target;
 use crate::export::selection::{Choice, Moment, Selection, SnapshotRange};
@@ -60,6 +59,8 @@ const FRAMES_PER_S_DEFAULT: u16 = 25;
     snapshot.\n\n\
     Coordinates are those of the recording, in m, relative to the origin of the scene: no format \
     turns the scene.\n\n\
+    `-` as the FILE of --apng, --npz, --csv, --usda and --foxglove is stdout. The line about the result is then on \
+    stderr.\n\n\
     Exit codes: 0 exported; 1 failed; 3 the file is truncated or damaged, and what is intact was \
     exported, if anything is.\n\nExamples:\n  \
     recorder export run.mcap --png pictures\n  \
@@ -226,28 +227,23 @@ fn export<R: Read>(
     let frames_per_s = args.fps.filter(|_| format.data().is_some_and(DataFormat::has_frames));
     let snapshots = Snapshots { frames_per_s, ..snapshots };
     let existing = args.overwrite.existing();
-    match *format {
+    let written = match *format {
         Format::Pictures(format, folder) => {
             let target = Target::new(folder, format, existing, &survey.run.scene_name);
             let written = pictures::draw(&snapshots, args.picture_options(), &target)?;
             let files: Vec<_> = written.iter().map(|picture| picture.file.as_str()).collect();
-            output::result(args.as_json, &written, &files.join("\n"))
+            return output::result(args.as_json, &written, &files.join("\n"));
         }
         Format::Animation(path) => {
-            let written =
-                pictures::animate(&snapshots, args.picture_options(), args.pace(), path, existing)?;
-            output::result(args.as_json, &written, &written.to_string())
+            pictures::animate(&snapshots, args.picture_options(), args.pace(), path, existing)?
         }
-        Format::Data(format, target) => {
-            let written = data::write(&snapshots, format, target, existing)?;
-            // On stdout, the result is the file.
-            if is_stdout(target) {
-                output::note(&written.to_string());
-                return Ok(());
-            }
-            output::result(args.as_json, &written, &written.to_string())
-        }
+        Format::Data(format, target) => data::write(&snapshots, format, target, existing)?,
+    };
+    if format.is_stdout() {
+        output::note(&written.to_string());
+        return Ok(());
     }
+    output::result(args.as_json, &written, &written.to_string())
 }
 
 impl ExportArgs {

@@ -93,10 +93,29 @@ fn times_in_exported_data_are_those_of_the_run() {
     let text = std::fs::read_to_string(&table).unwrap();
     assert!(text.lines().nth(1).unwrap().starts_with("30,0.15,0,"), "{}", &text[..200]);
     assert!(text.lines().last().unwrap().starts_with("40,0.2,"));
-    // The path - is stdout, and the report goes to stderr.
-    let piped = recorder(&sandbox, &["export", &file, "--csv", "-"]);
-    assert_eq!((piped.code, piped.stdout.as_str()), (Some(0), text.as_str()));
-    assert!(piped.stderr.contains("-: 11 snapshots (steps 30..=40)"), "{}", piped.stderr);
+}
+
+#[test]
+fn an_export_to_stdout_prints_its_result_on_stderr() {
+    let sandbox = Sandbox::new();
+    let file = sandbox.path("run.mcap");
+    recorder(&sandbox, &["simulate", "rope", "--steps", "10", "-o", &file]).success();
+    for option in ["--apng", "--npz", "--csv", "--usda", "--foxglove"] {
+        let output = sandbox.path(option);
+        let size = if option == "--apng" { &["--size", "32x32"][..] } else { &[] };
+        let export = |target| {
+            let args = ["export", &file, option, target, "--every", "20ms"];
+            recorder(&sandbox, &[&args[..], size].concat())
+        };
+        export(&output).success();
+        let piped = export("-");
+        let expected = std::fs::read(output).unwrap();
+        assert_eq!(piped.code, Some(0), "{option}: {}", piped.stderr);
+        assert!(piped.stdout == String::from_utf8_lossy(&expected), "{option}");
+        assert!(piped.stderr.contains("-: 3 snapshots (steps 0..=10)"), "{}", piped.stderr);
+    }
+    let refused = recorder(&sandbox, &["export", &file, "--pc2", "-"]);
+    assert_eq!((refused.code, refused.stdout.as_str()), (Some(1), ""), "{refused:?}");
 }
 
 #[test]

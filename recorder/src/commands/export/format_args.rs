@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::data::DataFormat;
 use crate::cli::output::path_text;
+use crate::export::data::written_files::is_stdout;
 use crate::export::pictures::target::PictureFormat;
 
 /// The formats. One of them is required.
@@ -23,7 +24,7 @@ pub(super) struct FormatArgs {
     /// their steps; and recorded forces, as impulses in N s
     #[arg(long, value_name = "FILE")]
     npz: Option<PathBuf>,
-    /// Write a table with a row for each particle of each snapshot; `-` is stdout
+    /// Write a table with a row for each particle of each snapshot
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
     /// Write a table of CSV with the energy of each snapshot in J: kinetic, potential, elastic and their sum; `-` is stdout
@@ -73,17 +74,27 @@ impl Format<'_> {
 
     /// Returns a warning if the file has the extension of another format.
     pub(super) fn extension_warning(&self) -> Option<String> {
-        let expected = match self {
-            // An animation is a PNG file, which has either extension.
-            Self::Animation(_) => &["png", "apng"][..],
-            Self::Data(format, _) => format.extensions(),
-            Self::Pictures(..) => &[],
-        };
+        let expected = self.extensions();
         let extension = self.target().extension()?;
         let is_known = expected.iter().any(|known| extension.eq_ignore_ascii_case(known));
         let first = expected.first().filter(|_| !is_known)?;
         let target = path_text(self.target());
         Some(format!("warning: programs expect the extension .{first} for the format of {target}"))
+    }
+
+    /// Returns the extensions of the file; none for a folder.
+    fn extensions(&self) -> &'static [&'static str] {
+        match self {
+            // An animation is a PNG file, which has either extension.
+            Self::Animation(_) => &["png", "apng"],
+            Self::Data(format, _) => format.extensions(),
+            Self::Pictures(..) => &[],
+        }
+    }
+
+    /// Returns `true` if the file is written to stdout. A folder may have the name `-`.
+    pub(super) fn is_stdout(&self) -> bool {
+        !self.extensions().is_empty() && is_stdout(self.target())
     }
 
     /// Returns the file or the folder to write.

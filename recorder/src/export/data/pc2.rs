@@ -7,7 +7,7 @@ use anyhow::{Context, bail};
 
 use super::faces::Faces;
 use super::obj;
-use super::written_files::WrittenFiles;
+use super::written_files::{WrittenFiles, is_stdout};
 use crate::export::snapshots::Snapshots;
 
 const MAGIC: &[u8; 12] = b"POINTCACHE2\0";
@@ -33,6 +33,11 @@ fn mesh_path(path: &Path) -> anyhow::Result<PathBuf> {
     let mesh_path = path.with_extension("obj");
     if mesh_path == path {
         bail!("{}: the mesh gets this name; name the cache FILE.pc2", path.display());
+    }
+    if is_stdout(path) {
+        bail!(
+            "a cache and its mesh are two files, which stdout cannot take; name the cache FILE.pc2"
+        );
     }
     Ok(mesh_path)
 }
