@@ -1,7 +1,9 @@
 //! Command files: one JSON object per line. The rows of `/outcomes` are such lines.
 
+use serde::Deserialize;
 use serde_json::{Map, Value};
-use sim_contract::{Action, ActionFields, PathPart, PathPoint, PlainF32, Text};
+use sim_contract::{Action, ActionFields, PathPoint, PlainF32, Text};
+use sim_solver::MOTION_POINTS_MAX;
 
 /// A command and the step in which it takes effect.
 #[derive(Debug, Clone, PartialEq)]
@@ -12,7 +14,7 @@ pub struct TimedCommand {
     pub index: Option<u64>,
     /// Sender of the command. 0 is the console.
     pub client_id: u64,
-    /// Number of the command among those of its client; by default its line in the file.
+    /// Number of the command among those of its client; by default its number in the file, from 1.
     pub sequence: u64,
     /// The command.
     pub action: Action,
@@ -62,7 +64,8 @@ pub fn parse_commands(text: &str, label: &str) -> Result<Vec<TimedCommand>, Comm
         if text.trim().is_empty() {
             continue;
         }
-        let of_line = parse_line(text, line).map_err(|error| {
+        let number = commands.len() as u64 + 1;
+        let of_line = parse_line(text, number).map_err(|error| {
             let label = label.to_owned();
             CommandFileError { label, line, error }
         })?;
@@ -93,8 +96,9 @@ pub fn sort_commands(commands: &mut [TimedCommand]) {
     }
 }
 
-/// Parses the command of a line; a long path becomes several.
-fn parse_line(text: &str, line: usize) -> Result<Vec<TimedCommand>, FieldError> {
+/// Parses the command of a line, whose number in the file is `number`. A long path becomes several commands, with
+/// ascending numbers.
+fn parse_line(text: &str, number: u64) -> Result<Vec<TimedCommand>, FieldError> {
     let Ok(Value::Object(fields)) = serde_json::from_str(text) else {
         let example = r#"an object such as {"step":1,"kind":"pin","particle":0}"#;
         return Err(invalid("line", "is not a JSON object", example));
@@ -103,9 +107,9 @@ fn parse_line(text: &str, line: usize) -> Result<Vec<TimedCommand>, FieldError> 
     let step = step.ok_or_else(|| missing("step", "whole numbers from 1"))?;
     let index = integer(&fields, "index", 0)?;
     let client_id = integer(&fields, "client_id", 0)?.unwrap_or(0);
-    let sequence = integer(&fields, "sequence", 0)?.unwrap_or(line as u64);
-    let command = |action| TimedCommand { step, index, client_id, sequence, action };
-    Ok(actions(&fields)?.into_iter().map(command).collect())
+    let first = integer(&fields, "sequence", 0)?.unwrap_or(number);
+    let command = |(sequence, action)| TimedCommand { step, index, client_id, sequence, action };
+    Ok((first..).zip(actions(&fields)?).map(command).collect())
 }
 
 fn actions(fields: &Map<String, Value>) -> Result<Vec<Action>, FieldError> {
@@ -145,25 +149,31 @@ fn actions(fields: &Map<String, Value>) -> Result<Vec<Action>, FieldError> {
         fields.iter().filter(|(name, _)| *name == "kind" || own().any(|own| own == *name));
     let mut object: Map<_, _> =
         own_fields.map(|(name, value)| (name.clone(), value.clone())).collect();
-    let points = object.get("path").and_then(points).unwrap_or_default();
-    if points.len() > PathPart::POINTS_MAX {
-        object.insert("path".to_owned(), Value::Array(Vec::new()));
-    }
+    let path = object.get_mut("path").map(|path| std::mem::replace(path, Value::Array(Vec::new())));
     // All fields are valid. The error of serde would name internal types.
-    match serde_json::from_value(Value::Object(object)) {
-        Ok(Action::Follow { object, object_index, append, .. })
-            if points.len() > PathPart::POINTS_MAX =>
+    let action = serde_json::from_value(Value::Object(object))
+        .map_err(|_| invalid("line", "is not a command", &kind_names()))?;
+    match (action, path) {
+        (Action::Follow { object, object_index, append, .. }, Some(Value::Array(points)))
+            if !points.is_empty() =>
         {
-            Ok(Action::follow(object, object_index, &points, append))
+            Ok(Action::follow(object, object_index, &path_points(points)?, append))
         }
-        Ok(action) => Ok(vec![action]),
-        Err(_) => Err(invalid("line", "is not a command", &kind_names())),
+        (action, _) => Ok(vec![action]),
     }
 }
 
-/// The points of a path.
-fn points(path: &Value) -> Option<Vec<PathPoint>> {
-    serde_json::from_value(path.clone()).ok()
+fn path_points(points: Vec<Value>) -> Result<Vec<PathPoint>, FieldError> {
+    if points.len() > MOTION_POINTS_MAX {
+        let problem = format!("has {} points", points.len());
+        return Err(invalid("path", &problem, &format!("up to {MOTION_POINTS_MAX} points")));
+    }
+    let point = |value: Value| {
+        PathPoint::deserialize(&value).map_err(|_| {
+            invalid("path", &format!("{value} is invalid"), allowed_values("follow", "path"))
+        })
+    };
+    points.into_iter().map(point).collect()
 }
 
 fn integer(fields: &Map<String, Value>, name: &str, min: u64) -> Result<Option<u64>, FieldError> {
@@ -189,7 +199,7 @@ fn is_valid(kind: &str, name: &str, value: &Value) -> bool {
         "force" if kind == "release" => value.is_boolean(),
         "target" | "center" | "delta" | "from" | "to" | "direction" | "translation"
         | "velocity" | "angular_velocity" | "force" | "torque" => are_numbers(3),
-        "path" => points(value).is_some(),
+        "path" => value.is_array(),
         "append" => value.is_boolean(),
         "object" => ["particle", "anchor", "collider"].iter().any(|object| value == object),
         "to_step" => value.is_u64(),
@@ -262,7 +272,7 @@ mod tests {
             {"step":5,"kind":"step","count":2,"index":7,"status":"rejected","reason":"x"}"#;
         let commands = parse_commands(text, "x").unwrap();
         let order: Vec<_> = commands.iter().map(|c| (c.step, c.client_id, c.sequence)).collect();
-        assert_eq!(order, [(3, 2, 99), (3, 7, 3), (3, 7, 4), (5, 0, 7), (5, 0, 6), (9, 0, 2)]);
+        assert_eq!(order, [(3, 2, 99), (3, 7, 2), (3, 7, 3), (5, 0, 6), (5, 0, 5), (9, 0, 1)]);
         assert_eq!(commands[0].action, Action::Pause);
         assert_eq!(commands[3].action, Action::Step { count: 2 });
     }
@@ -277,7 +287,7 @@ mod tests {
             {"step":9,"kind":"pause"}"#;
         let commands = parse_commands(text, "x").unwrap();
         let order: Vec<_> = commands.iter().map(|one| (one.step, one.sequence)).collect();
-        assert_eq!(order, [(3, 2), (4, 3), (5, 4), (5, 5), (9, 6)]);
+        assert_eq!(order, [(3, 1), (4, 2), (5, 3), (5, 4), (9, 5)]);
     }
 
     #[test]
@@ -305,17 +315,22 @@ mod tests {
         }
     }
 
+    fn line_with_path(point_count: usize) -> String {
+        let point = |time| format!(r#"{{"time":{time},"translation":[0,{time},0]}}"#);
+        let points: Vec<_> = (1..=point_count).map(point).collect();
+        let points = points.join(",");
+        format!(
+            r#"{{"step":5,"kind":"follow","object":"anchor","object_index":3,"path":[{points}]}}"#
+        )
+    }
+
     #[test]
-    fn a_long_path_becomes_a_chain_of_commands() {
-        let points: Vec<_> = (1..=9)
-            .map(|time| format!(r#"{{"time":{time},"translation":[0,{time},0]}}"#))
-            .collect();
-        let line = format!(
-            r#"{{"step":5,"kind":"follow","object":"anchor","object_index":3,"path":[{}]}}"#,
-            points.join(",")
-        );
-        let commands = parse_commands(&line, "x").unwrap();
-        let parts: Vec<_> = commands
+    fn a_long_path_becomes_a_chain_of_commands_that_are_numbered_as_if_each_had_a_line() {
+        let text = format!("{}\n{{\"step\":5,\"kind\":\"pause\"}}", line_with_path(9));
+        let commands = parse_commands(&text, "x").unwrap();
+        let sequences: Vec<_> = commands.iter().map(|command| command.sequence).collect();
+        assert_eq!(sequences, [1, 2, 3, 4]);
+        let parts: Vec<_> = commands[..3]
             .iter()
             .map(|command| match command.action {
                 Action::Follow { path, append, .. } => (command.step, path.points().len(), append),
@@ -323,6 +338,13 @@ mod tests {
             })
             .collect();
         assert_eq!(parts, [(5, 4, false), (5, 4, true), (5, 1, true)]);
+    }
+
+    #[test]
+    fn a_path_of_more_points_than_a_motion_has_is_refused() {
+        assert_eq!(parse_commands(&line_with_path(2048), "x").unwrap().len(), 512);
+        let expected = "drag.jsonl:1: path: has 2049 points (allowed: up to 2048 points)";
+        assert_eq!(error(&line_with_path(2049)), expected);
     }
 
     #[test]
@@ -388,7 +410,7 @@ mod tests {
         drag.jsonl:2: to_step: is missing (allowed: whole numbers from 0)
         drag.jsonl:2: scene: null is invalid (allowed: the name of a scene, at most 160 bytes)
         drag.jsonl:2: object: "rope" is invalid (allowed: particle, anchor or collider)
-        drag.jsonl:2: path: [{"time":1}] is invalid (allowed: points such as {"time":0.5,"translation":[0,0.1,0],"rotation":[0,0,0,1]})
+        drag.jsonl:2: path: {"time":1} is invalid (allowed: points such as {"time":0.5,"translation":[0,0.1,0],"rotation":[0,0,0,1]})
         "#);
     }
 }
