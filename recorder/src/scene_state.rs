@@ -72,7 +72,8 @@ pub struct SceneState {
     pub colliders: Vec<ColliderRow>,
     /// The triangles of the colliders, once one of them is a mesh.
     pub collider_meshes: Option<Arc<ColliderMeshes>>,
-    /// The outcomes of commands that no visited state before contains; some may be those of later steps.
+    /// The outcomes of commands from the first visited step on that no visited state before contains. Some may be
+    /// those of later steps.
     pub outcomes: Vec<OutcomeRow>,
     /// The forces of the step, if the recording has them.
     pub forces: Option<ForcesRow>,
@@ -91,6 +92,7 @@ pub fn visit_states<R: Read, E: From<SceneStateError>>(
     mut visit: impl FnMut(&SceneState) -> Result<ControlFlow<()>, E>,
 ) -> Result<(), E> {
     let mut steps = steps.into_iter().peekable();
+    let first_step = steps.peek().copied().unwrap_or_default();
     let mut frames = FrameReader::new(log);
     let mut state = SceneState::default();
     let mut tears = TearTracker::new(Torn::default());
@@ -108,6 +110,7 @@ pub fn visit_states<R: Read, E: From<SceneStateError>>(
             state.parameters = Some(row.values);
         }
         state.read_meshes(frames.log());
+        state.outcomes.retain(|row| row.step >= first_step);
         while steps.next_if(|step| *step < state.row.step).is_some() {}
         if steps.next_if_eq(&state.row.step).is_some() {
             state.set_torn(tears.at(state.row.step).iter().flat_map(|torn| torn.indices()))?;

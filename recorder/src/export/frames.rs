@@ -14,7 +14,7 @@ pub(crate) struct Frame<'a> {
     pub(crate) number: u64,
     /// Simulated time of the run, in s.
     pub(crate) time_s: f64,
-    /// Lies between two snapshots.
+    /// The state is interpolated between two snapshots.
     pub(crate) is_interpolated: bool,
     pub(crate) state: &'a SceneState,
 }
@@ -48,11 +48,10 @@ impl FrameGrid {
         u64::try_from(last).unwrap_or(u64::MAX).saturating_add(1)
     }
 
-    /// Returns the step at which a frame lies, if it lies at one.
-    fn step(self, number: u64) -> Option<u64> {
-        let (place, frames_per_s) = (self.scaled_frame(number), u128::from(self.frames_per_s));
-        let steps = u64::try_from(place / frames_per_s).ok()?;
-        place.is_multiple_of(frames_per_s).then_some(self.first_step + steps)
+    /// Returns the place of a frame as a share of the way from one step to another.
+    fn share(self, number: u64, [from, to]: [u64; 2]) -> f64 {
+        let [start, end] = [from, to].map(|step| self.scaled_place(step));
+        (self.scaled_frame(number) - start) as f64 / (end - start) as f64
     }
 }
 
@@ -80,16 +79,20 @@ impl Snapshots<'_> {
         self.frames_per_s.map_or(self.run.rate_hz, u32::from)
     }
 
-    /// Counts the frames that lie between two snapshots.
+    /// Counts the frames that are interpolated between two snapshots.
     pub(crate) fn interpolated_count(&self) -> usize {
         let Some(grid) = self.grid() else { return 0 };
-        let is_snapshot = |number: &u64| {
-            grid.step(*number).is_some_and(|step| self.steps.binary_search(&step).is_ok())
+        let is_interpolated = |number: &u64| {
+            let place = grid.scaled_frame(*number);
+            let next = self.steps.partition_point(|step| grid.scaled_place(*step) < place);
+            let (before, after) = (self.steps[next.saturating_sub(1)], self.steps[next]);
+            grid.scaled_place(after) != place && self.is_continuous(before, after)
         };
-        self.frame_numbers().iter().filter(|number| !is_snapshot(number)).count()
+        self.frame_numbers().iter().filter(|number| is_interpolated(number)).count()
     }
 
-    /// Visits all frames from first to last.
+    /// Visits all frames from first to last. A frame before a state that a command put in place shows the snapshot
+    /// before it.
     pub(crate) fn for_each_frame(
         &self,
         mut add: impl FnMut(&Frame<'_>) -> anyhow::Result<()>,
@@ -101,49 +104,49 @@ impl Snapshots<'_> {
                 add(&Frame { number, time_s, is_interpolated, state })
             });
         };
-        let (mut number, mut before) = (0, None);
-        self.for_each(|state| {
-            while grid.scaled_frame(number) <= grid.scaled_place(state.row.step) {
-                let between =
-                    before.as_ref().and_then(|one| interpolated(grid, number, one, state));
-                let is_interpolated = between.is_some();
-                let frame_state = between.as_ref().unwrap_or(state);
-                let time_s = grid.time_s(number);
-                add(&Frame { number, time_s, is_interpolated, state: frame_state })?;
+        let mut number = 0;
+        let mut add = |number, is_interpolated, state: &SceneState| {
+            add(&Frame { number, time_s: grid.time_s(number), is_interpolated, state })
+        };
+        // The snapshot before, if a frame lies between it and the next one.
+        let mut before = None::<SceneState>;
+        self.for_each(|after| {
+            let step = after.row.step;
+            if let Some(before) = before.take() {
+                let is_interpolated = self.is_continuous(before.row.step, step);
+                let mut state = before.clone();
+                while grid.scaled_frame(number) < grid.scaled_place(step) {
+                    if is_interpolated {
+                        let share = grid.share(number, [before.row.step, step]);
+                        interpolate(&mut state, [&before, after], share);
+                    }
+                    add(number, is_interpolated, &state)?;
+                    number += 1;
+                }
+            }
+            if grid.scaled_frame(number) == grid.scaled_place(step) {
+                add(number, false, after)?;
                 number += 1;
             }
-            before = Some(state.clone());
+            let next = self.steps.get(self.steps.partition_point(|one| *one <= step));
+            let is_needed =
+                next.is_some_and(|next| grid.scaled_frame(number) < grid.scaled_place(*next));
+            before = is_needed.then(|| after.clone());
             Ok(())
         })
     }
 }
 
-/// Returns the state at a frame between two snapshots, or `None` if it lies at the second one. A state that
-/// a command put in place has no way to it: the frames before it show the first snapshot.
-fn interpolated(
-    grid: FrameGrid,
-    number: u64,
-    before: &SceneState,
-    after: &SceneState,
-) -> Option<SceneState> {
-    let [start, end] = [before, after].map(|state| grid.scaled_place(state.row.step));
-    let frame = grid.scaled_frame(number);
-    if frame == end {
-        return None;
+/// Sets the particles and the colliders of a state to those between two snapshots.
+fn interpolate(state: &mut SceneState, [before, after]: [&SceneState; 2], share: f64) {
+    state.particles.clone_from(&before.particles);
+    for (particle, target) in state.particles.iter_mut().zip(&after.particles) {
+        move_particle(particle, target, share);
     }
-    let step_count = after.row.step - before.row.step;
-    let is_continuous = after.row.scene_step.checked_sub(before.row.scene_step) == Some(step_count);
-    let mut state = before.clone();
-    if is_continuous {
-        let share = (frame - start) as f64 / (end - start) as f64;
-        for (particle, target) in state.particles.iter_mut().zip(&after.particles) {
-            move_particle(particle, target, share);
-        }
-        for (collider, target) in state.colliders.iter_mut().zip(&after.colliders) {
-            move_collider(collider, target, share);
-        }
+    state.colliders.clone_from(&before.colliders);
+    for (collider, target) in state.colliders.iter_mut().zip(&after.colliders) {
+        move_collider(collider, target, share);
     }
-    Some(state)
 }
 
 fn move_particle(particle: &mut ParticleState, target: &ParticleState, share: f64) {

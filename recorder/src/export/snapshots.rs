@@ -1,5 +1,6 @@
 //! The selected snapshots of a recording, which a format reads as often as it needs.
 
+use std::collections::BTreeSet;
 use std::io::Read;
 use std::ops::ControlFlow;
 
@@ -28,6 +29,8 @@ pub(crate) struct Snapshots<'a> {
     pub(crate) first_step: u64,
     /// Steps of the selected snapshots, ascending. Not empty.
     pub(crate) steps: &'a [u64],
+    /// Steps at which a command put a state in place, so that no motion leads to it.
+    pub(crate) replaced_at: &'a BTreeSet<u64>,
     /// Number of particles of each snapshot.
     pub(crate) particle_count: usize,
     /// Exports evenly spaced frames in place of the snapshots, this many per second of simulated time.
@@ -48,13 +51,16 @@ impl Snapshots<'_> {
         step.saturating_sub(self.first_step) as f64 / f64::from(self.run.rate_hz)
     }
 
-    /// Returns the outcomes of commands that a state adds, of the steps from the first selected snapshot on.
+    /// Returns `true` if a motion leads from the state of one step to that of a later one.
+    pub(crate) fn is_continuous(&self, from: u64, to: u64) -> bool {
+        self.replaced_at.range(from + 1..=to).next().is_none()
+    }
+
+    /// Returns the outcomes of commands that a state adds. The first selected snapshot adds those of its step.
     pub(crate) fn outcomes<'s>(&self, state: &'s SceneState) -> &'s [OutcomeRow] {
-        let first_step = self.steps.first().copied().unwrap_or_default();
         // They are in the order of their steps.
-        let start = state.outcomes.partition_point(|row| row.step < first_step);
         let end = state.outcomes.partition_point(|row| row.step <= state.row.step);
-        &state.outcomes[start.min(end)..end]
+        &state.outcomes[..end]
     }
 
     /// Reads the selected snapshots from first to last.

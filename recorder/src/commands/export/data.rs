@@ -62,7 +62,7 @@ pub(super) struct Written {
 struct Resampling {
     frames_per_s: u16,
     frame_count: usize,
-    /// Frames that lie between two snapshots.
+    /// Frames that are interpolated between two snapshots.
     interpolated_count: usize,
 }
 
@@ -128,7 +128,7 @@ impl fmt::Display for Written {
         };
         let frames = counted(*frame_count as u64, "frame");
         let source = match interpolated_count {
-            0 => "each a snapshot".to_owned(),
+            0 => "each shows a snapshot".to_owned(),
             count => format!("{count} interpolated between snapshots"),
         };
         write!(

@@ -1,9 +1,12 @@
 //! The properties of a recording that an export needs before it begins.
 
+use std::collections::BTreeSet;
 use std::io::Read;
 
 use anyhow::{Context, bail};
-use recorder::{FrameReader, LogEnd, LogReader, Message, RunDescription, ShapeRow, recorded_scene};
+use recorder::{
+    FrameReader, LogEnd, LogReader, Message, RunDescription, ShapeRow, StepRow, recorded_scene,
+};
 use sim_solver::Scene;
 use sim_solver::scene::Up;
 
@@ -22,6 +25,8 @@ pub(super) struct Survey {
     pub(super) scene: Result<Scene, String>,
     /// Steps of all snapshots, ascending.
     pub(super) steps: Vec<u64>,
+    /// Steps at which a command put a state in place.
+    replaced_at: BTreeSet<u64>,
     /// A collider is a mesh, whose triangles are in the scene.
     has_mesh: bool,
     /// Number of particles of the first snapshot.
@@ -43,6 +48,7 @@ impl Survey {
         let run = log.run().clone();
         let mut frames = FrameReader::new(log);
         let (mut steps, mut particle_count, mut has_mesh) = (Vec::new(), 0, false);
+        let (mut replaced_at, mut previous) = (BTreeSet::new(), None);
         while let Some(frame) = frames.next_frame().with_context(|| path.to_owned())? {
             if steps.len() == SNAPSHOTS_MAX {
                 bail!("{path}: has more than {SNAPSHOTS_MAX} snapshots");
@@ -51,6 +57,13 @@ impl Survey {
                 particle_count = frame.payload().len();
             }
             steps.push(frame.row.step);
+            replaced_at.extend(frame.updates.iter().filter_map(replaced_step));
+            // A recording without outcomes shows it by the steps of its scene.
+            let StepRow { step, scene_step, .. } = frame.row;
+            let offset = step.checked_sub(scene_step);
+            if previous.replace(offset).is_some_and(|previous| previous != offset) {
+                replaced_at.insert(step);
+            }
             has_mesh |= frame.updates.iter().any(has_mesh_collider);
             if steps.len().is_multiple_of(SNAPSHOTS_PER_UPDATE) {
                 on_progress(frames.log().intact_count());
@@ -58,7 +71,9 @@ impl Survey {
         }
         let end = frames.end().cloned().unwrap_or(LogEnd::Complete);
         let intact_count = frames.log().intact_count();
-        Ok(Self { run, scene, steps, has_mesh, particle_count, end, intact_count })
+        let survey =
+            Self { run, scene, steps, replaced_at, has_mesh, particle_count, end, intact_count };
+        Ok(survey)
     }
 
     /// Returns a warning of what an export lacks without a readable scene.
@@ -84,12 +99,20 @@ impl Survey {
             is_2d: scene.is_some_and(|scene| scene.dimensions == 2),
             first_step: self.steps.first().copied().unwrap_or_default(),
             steps,
+            replaced_at: &self.replaced_at,
             particle_count: self.particle_count,
             frames_per_s: None,
             visit,
             open_bytes,
         }
     }
+}
+
+/// Returns the step of a state that a command put in place.
+fn replaced_step(message: &Message) -> Option<u64> {
+    let Message::Outcome(row) = message else { return None };
+    let is_replaced = row.replaces_state() || row.puts_state_in_place();
+    (is_replaced && row.is_applied()).then_some(row.step)
 }
 
 fn has_mesh_collider(message: &Message) -> bool {

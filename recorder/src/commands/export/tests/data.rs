@@ -4,7 +4,8 @@
 use std::io::Cursor;
 use std::path::PathBuf;
 
-use recorder::FrameReader;
+use recorder::{FrameReader, OutcomeRow};
+use sim_contract::{Action, Command, Outcome, RestoreContents};
 use sim_solver::scene::{Mesh, Shape};
 use zip::ZipArchive;
 
@@ -369,16 +370,37 @@ fn frames_are_evenly_spaced_and_interpolated_between_snapshots() {
     assert!(vtk["line.pvd"].contains("timestep=\"0.03\" part=\"0\" file=\"line_00000003.vtp\""));
 }
 
+/// Copies a recording, with the outcome of an applied command before the snapshot of its step.
+fn with_outcome(file: &[u8], action: Action, step: u64) -> Vec<u8> {
+    let mut log = LogReader::new(file).unwrap();
+    let (run, scene) = (log.run().clone(), log.scene().to_vec());
+    let mut copy = LogWriter::create(Vec::new(), LogOptions::default(), &run, &scene, 0).unwrap();
+    let outcome = Outcome::new(0, step, Command::new(0, 1, action), Ok(()));
+    while let Some(logged) = log.next_message().unwrap() {
+        if matches!(&logged.message, Message::Step(row) if row.step == step) {
+            copy.write(&Message::Outcome(OutcomeRow::from(&outcome)), 0).unwrap();
+        }
+        copy.write(&logged.message, 0).unwrap();
+    }
+    copy.finish(&Closing::default()).unwrap()
+}
+
 #[test]
-fn frames_before_a_reset_keep_the_snapshot_before_it() {
-    let commands = r#"{"step":7,"kind":"reset"}"#;
-    let file = record_commands(ROPE, commands, 12);
-    let particles = recorded(&file);
-    // Frame 1 lies at step 6.86.
-    let objs = texts(&file, DataFormat::Obj, Some(35));
-    let found = positions(&objs["line_00000001.obj"]);
-    let expected: Vec<_> = particles[6 * 4..7 * 4].iter().map(|one| one.position).collect();
-    assert_eq!(found, expected);
+fn frames_before_a_state_that_was_put_in_place_show_the_snapshot_before_it() {
+    let reset = record_commands(ROPE, r#"{"step":7,"kind":"reset"}"#, 12);
+    let contents = RestoreContents::Motion;
+    let restore = Action::Restore { contents, state_hash: 0 };
+    for file in [reset, with_outcome(&record(ROPE, 12), restore, 7)] {
+        let particles = recorded(&file);
+        // Frame 1 lies at step 6.86.
+        let objs = texts(&file, DataFormat::Obj, Some(35));
+        let obj = &objs["line_00000001.obj"];
+        let expected: Vec<_> = particles[6 * 4..7 * 4].iter().map(|one| one.position).collect();
+        assert_eq!(positions(obj), expected);
+        assert!(obj.starts_with("# frame 1 at 0.028571 s: step 6\n"), "{obj}");
+        let stage = stage(&file, Some(35));
+        assert!(stage.contains("0 of 2 frames are interpolated"), "{stage}");
+    }
 }
 
 #[test]
