@@ -5,6 +5,7 @@
 use std::collections::BTreeSet;
 use std::io::Write;
 
+use anyhow::bail;
 use recorder::{ForcesRow, OutcomeRow, SceneState};
 use sim_contract::{ParticleState, PlainF32};
 use zip::write::{SimpleFileOptions, StreamWriter};
@@ -16,6 +17,8 @@ use crate::export::snapshots::Snapshots;
 const HEADER_ALIGNMENT: usize = 64;
 /// Bytes of a header before its text: the magic string, the version, and the length of the text.
 const PREFIX_SIZE_BYTES: usize = 10;
+/// Bytes of a number in the arrays of particles and forces.
+const NUMBER_SIZE_BYTES: usize = 4;
 
 /// A column of the particles.
 struct Column {
@@ -172,8 +175,11 @@ pub(crate) fn write(snapshots: &Snapshots<'_>, out: &mut dyn Write) -> anyhow::R
     for step in steps {
         archive.0.write_all(&snapshots.run_time_s(*step).to_le_bytes())?;
     }
-    for column in COLUMNS {
-        archive.add_column(snapshots, &column)?;
+    for Column { name, number_type, width, append } in COLUMNS {
+        let array = Array { name, number_type, rows: snapshots.particle_count, width };
+        archive.add_array(snapshots, &array, |state, bytes| {
+            state.particles.iter().for_each(|particle| append(particle, bytes));
+        })?;
     }
     let survey = Survey::read(snapshots)?;
     archive.add_commands(&survey.commands)?;
@@ -181,12 +187,29 @@ pub(crate) fn write(snapshots: &Snapshots<'_>, out: &mut dyn Write) -> anyhow::R
         let fixed: Vec<_> = survey.fixed.iter().copied().collect();
         archive.begin("fixed_particles", "<u4", &[fixed.len()])?;
         archive.0.write_all(bytemuck::cast_slice(&fixed))?;
-        for column in FORCE_COLUMNS {
-            archive.add_forces(snapshots, &survey, &column)?;
+        for ForceColumn { name, number_type, width, rows, append } in FORCE_COLUMNS {
+            let rows = rows(&survey);
+            let array = Array { name, number_type, rows, width };
+            // A snapshot without forces has NaN, or 0 of a whole number.
+            let missing = if number_type == "<f4" { f32::NAN.to_le_bytes() } else { [0; 4] };
+            archive.add_array(snapshots, &array, |state, bytes| match &state.forces {
+                Some(row) => append(&survey, row, bytes),
+                None => bytes.extend(missing.repeat(rows * width)),
+            })?;
         }
     }
     archive.0.finish()?;
     Ok(())
+}
+
+/// An array with rows of numbers for each snapshot.
+struct Array {
+    name: &'static str,
+    number_type: &'static str,
+    /// Rows per snapshot.
+    rows: usize,
+    /// Numbers per row. One number has no axis of its own.
+    width: usize,
 }
 
 /// An archive that is written without seeking.
@@ -203,22 +226,30 @@ impl Archive<'_> {
         Ok(())
     }
 
-    fn add_column(&mut self, snapshots: &Snapshots<'_>, column: &Column) -> anyhow::Result<()> {
-        let shape = [snapshots.steps.len(), snapshots.particle_count, column.width];
-        let axis_count = if column.width == 1 { 2 } else { 3 };
-        self.begin(column.name, column.number_type, &shape[..axis_count])?;
+    /// Adds an array. `append` appends the rows of a snapshot, as bytes.
+    fn add_array(
+        &mut self,
+        snapshots: &Snapshots<'_>,
+        array: &Array,
+        append: impl Fn(&SceneState, &mut Vec<u8>),
+    ) -> anyhow::Result<()> {
+        let Array { name, number_type, rows, width } = *array;
+        let shape = [snapshots.steps.len(), rows, width];
+        let axis_count = if width == 1 { 2 } else { 3 };
+        self.begin(name, number_type, &shape[..axis_count])?;
         let mut bytes = Vec::new();
         snapshots.for_each(|state| {
             bytes.clear();
-            for particle in &state.particles {
-                (column.append)(particle, &mut bytes);
+            append(state, &mut bytes);
+            let row_size_bytes = width * NUMBER_SIZE_BYTES;
+            if bytes.len() != rows * row_size_bytes {
+                let (step, found) = (state.row.step, bytes.len() / row_size_bytes);
+                bail!("step {step}: {name} has {found} rows, but {rows} in other steps");
             }
             Ok(self.0.write_all(&bytes)?)
         })
     }
-}
 
-impl Archive<'_> {
     /// Adds the commands as they are in `/outcomes`, and their steps.
     fn add_commands(&mut self, commands: &[OutcomeRow]) -> anyhow::Result<()> {
         self.begin("command_steps", "<u8", &[commands.len()])?;
@@ -235,30 +266,6 @@ impl Archive<'_> {
             self.0.write_all(&bytes)?;
         }
         Ok(())
-    }
-
-    /// Adds a column of the forces. What a snapshot lacks is NaN, or 0 of a whole number.
-    fn add_forces(
-        &mut self,
-        snapshots: &Snapshots<'_>,
-        survey: &Survey,
-        column: &ForceColumn,
-    ) -> anyhow::Result<()> {
-        let rows = (column.rows)(survey);
-        let shape = [snapshots.steps.len(), rows, column.width];
-        let axis_count = if column.width == 1 { 2 } else { 3 };
-        self.begin(column.name, column.number_type, &shape[..axis_count])?;
-        let missing = if column.number_type == "<f4" { f32::NAN.to_le_bytes() } else { [0; 4] };
-        let mut bytes = Vec::new();
-        snapshots.for_each(|state: &SceneState| {
-            bytes.clear();
-            if let Some(row) = &state.forces {
-                (column.append)(survey, row, &mut bytes);
-            } else {
-                bytes.extend(missing.repeat(rows * column.width));
-            }
-            Ok(self.0.write_all(&bytes)?)
-        })
     }
 }
 

@@ -14,7 +14,7 @@ use super::colliders::{Colliders, Pose};
 use super::faces::{Face, Faces};
 use crate::export::snapshots::Snapshots;
 
-/// Writes the stage. An attribute lists all its samples, so each of them reads the recording once.
+/// Writes the stage. The attributes of particles read the recording once each, because each lists all its samples.
 pub(crate) fn write(snapshots: &Snapshots<'_>, out: &mut dyn Write) -> anyhow::Result<()> {
     let faces = Faces::of(snapshots)?;
     write_header(snapshots, out)?;
@@ -233,8 +233,8 @@ fn identifiers(names: &[String]) -> Vec<String> {
         if identifier.starts_with(|first: char| first.is_ascii_digit()) {
             identifier.insert(0, '_');
         }
-        if identifiers.contains(&identifier) {
-            identifier = format!("{identifier}_{number}");
+        while identifiers.contains(&identifier) {
+            identifier += &format!("_{number}");
         }
         identifiers.push(identifier);
     }
@@ -248,26 +248,21 @@ fn write_colliders(
     colliders: &Colliders,
 ) -> anyhow::Result<()> {
     let first = snapshots.first()?;
-    let mut moves = vec![false; first.colliders.len()];
+    let mut samples = vec![PoseSamples::default(); first.colliders.len()];
     snapshots.for_each_frame(|frame| {
-        let pairs = first.colliders.iter().zip(&frame.state.colliders);
-        for (moves, (first, now)) in moves.iter_mut().zip(pairs) {
-            *moves |= first.shape != now.shape;
+        for (samples, collider) in samples.iter_mut().zip(&frame.state.colliders) {
+            samples.add(frame.number, colliders.pose(&collider.shape));
         }
         Ok(())
     })?;
     for (index, solid, pose) in colliders.solids(&first) {
         writeln!(out, "    def Mesh \"{}\"\n    {{", Colliders::name(index))?;
         let transform = "matrix4d xformOp:transform";
-        if moves[index] {
+        if let [_, _, ..] = samples[index].changes.as_slice() {
             writeln!(out, "        {transform}.timeSamples = {{")?;
-            snapshots.for_each_frame(|frame| {
-                let shape = frame.state.colliders.get(index).map(|one| &one.shape);
-                let Some(pose) = shape.and_then(|shape| colliders.pose(shape)) else {
-                    return Ok(());
-                };
-                Ok(writeln!(out, "            {}: {},", frame.number, Matrix(pose))?)
-            })?;
+            for (number, pose) in &samples[index].changes {
+                writeln!(out, "            {number}: {},", Matrix(*pose))?;
+            }
             writeln!(out, "        }}")?;
         } else {
             writeln!(out, "        {transform} = {}", Matrix(pose))?;
@@ -282,6 +277,30 @@ fn write_colliders(
         writeln!(out, "    }}")?;
     }
     Ok(())
+}
+
+/// The pose of a collider over time: a sample for each change, and one for the frame before it, because USD
+/// interpolates between samples.
+#[derive(Debug, Clone, Default)]
+struct PoseSamples {
+    changes: Vec<(u64, Pose)>,
+    last_number: u64,
+}
+
+impl PoseSamples {
+    /// Adds the pose in a frame, unless it is not finite.
+    fn add(&mut self, number: u64, pose: Option<Pose>) {
+        let last_number = std::mem::replace(&mut self.last_number, number);
+        let Some(pose) = pose else { return };
+        match self.changes.last().copied() {
+            Some((_, last)) if last == pose => return,
+            Some((sampled, last)) if sampled != last_number => {
+                self.changes.push((last_number, last));
+            }
+            _ => {}
+        }
+        self.changes.push((number, pose));
+    }
 }
 
 fn write_attribute<T: Display>(
@@ -328,5 +347,32 @@ impl Display for Matrix {
         let rows =
             rows.map(|(row, last)| format!("({:?}, {:?}, {:?}, {last})", row.x, row.y, row.z));
         write!(f, "({})", rows.join(", "))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{DQuat, DVec3};
+
+    use super::*;
+
+    #[test]
+    fn a_pose_has_samples_at_each_change_and_in_the_frame_before_it() {
+        let at = |x: i32| {
+            let translation = DVec3::new(x.into(), 0.0, 0.0);
+            Pose { translation, rotation: DQuat::IDENTITY }
+        };
+        let mut samples = PoseSamples::default();
+        for (number, x) in [(0, 0), (2, 0), (4, 0), (6, 1), (8, 2), (10, 2), (12, 2), (14, 0)] {
+            samples.add(number, Some(at(x)));
+        }
+        let expected = [(0, at(0)), (4, at(0)), (6, at(1)), (8, at(2)), (12, at(2)), (14, at(0))];
+        assert_eq!(samples.changes, expected);
+    }
+
+    #[test]
+    fn names_of_any_form_have_different_identifiers() {
+        let names = ["a b", "a_b_2", "a-b", "a b", "2nd"].map(str::to_owned);
+        assert_eq!(identifiers(&names), ["a_b", "a_b_2", "a_b_2_2", "a_b_3", "_2nd"]);
     }
 }

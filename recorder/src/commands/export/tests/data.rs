@@ -4,8 +4,8 @@
 use std::io::Cursor;
 use std::path::PathBuf;
 
-use recorder::{FrameReader, OutcomeRow};
-use sim_contract::{Action, Command, Outcome, RestoreContents};
+use recorder::{AnchorForceRow, ForcesRow, FrameReader, OutcomeRow};
+use sim_contract::{Action, Command, Outcome, PlainF32, RestoreContents};
 use sim_solver::scene::{Mesh, Shape};
 use zip::ZipArchive;
 
@@ -80,6 +80,28 @@ fn arrays_have_the_bits_of_the_recording() {
     assert_eq!(array("flags.npy").1, bytemuck::cast_slice::<_, u8>(&expected));
     let steps: Vec<u64> = (0..=30).collect();
     assert_eq!(array("steps.npy").1, bytemuck::cast_slice::<_, u8>(&steps));
+}
+
+#[test]
+fn arrays_of_forces_with_another_number_of_rows_are_refused() {
+    let forces = |step: u64, count: usize| {
+        let anchor =
+            AnchorForceRow { impulse: [PlainF32(1.0); 3], angular_impulse: [PlainF32(0.0); 3] };
+        let anchors = vec![anchor; count];
+        Message::Forces(ForcesRow { step, anchors, ..ForcesRow::default() })
+    };
+    let file = record(ROPE, 3);
+    let written = |counts: [usize; 2]| {
+        let file = with_messages(&file, |step| {
+            let count =
+                usize::try_from(step).ok().and_then(|step| counts.get(step.checked_sub(1)?));
+            count.map(|count| forces(step, *count))
+        });
+        with_snapshots(&file, None, |snapshots| npz::write(snapshots, &mut Vec::new()))
+    };
+    written([2, 2]).unwrap();
+    let error = written([1, 2]).unwrap_err().to_string();
+    assert_eq!(error, "step 1: anchor_impulses has 1 rows, but 2 in other steps");
 }
 
 #[test]
@@ -370,15 +392,18 @@ fn frames_are_evenly_spaced_and_interpolated_between_snapshots() {
     assert!(vtk["line.pvd"].contains("timestep=\"0.03\" part=\"0\" file=\"line_00000003.vtp\""));
 }
 
-/// Copies a recording, with the outcome of an applied command before the snapshot of its step.
-fn with_outcome(file: &[u8], action: Action, step: u64) -> Vec<u8> {
+/// Copies a recording, with further messages before the snapshots of their steps.
+fn with_messages(file: &[u8], further: impl Fn(u64) -> Option<Message>) -> Vec<u8> {
     let mut log = LogReader::new(file).unwrap();
     let (run, scene) = (log.run().clone(), log.scene().to_vec());
-    let mut copy = LogWriter::create(Vec::new(), LogOptions::default(), &run, &scene, 0).unwrap();
-    let outcome = Outcome::new(0, step, Command::new(0, 1, action), Ok(()));
+    let selection = ContentSelection::default().with_forces();
+    let options = LogOptions { selection, ..LogOptions::default() };
+    let mut copy = LogWriter::create(Vec::new(), options, &run, &scene, 0).unwrap();
     while let Some(logged) = log.next_message().unwrap() {
-        if matches!(&logged.message, Message::Step(row) if row.step == step) {
-            copy.write(&Message::Outcome(OutcomeRow::from(&outcome)), 0).unwrap();
+        if let Message::Step(row) = &logged.message
+            && let Some(message) = further(row.step)
+        {
+            copy.write(&message, 0).unwrap();
         }
         copy.write(&logged.message, 0).unwrap();
     }
@@ -390,7 +415,9 @@ fn frames_before_a_state_that_was_put_in_place_show_the_snapshot_before_it() {
     let reset = record_commands(ROPE, r#"{"step":7,"kind":"reset"}"#, 12);
     let contents = RestoreContents::Motion;
     let restore = Action::Restore { contents, state_hash: 0 };
-    for file in [reset, with_outcome(&record(ROPE, 12), restore, 7)] {
+    let outcome = Outcome::new(0, 7, Command::new(0, 1, restore), Ok(()));
+    let outcome = |step| (step == 7).then(|| Message::Outcome(OutcomeRow::from(&outcome)));
+    for file in [reset, with_messages(&record(ROPE, 12), outcome)] {
         let particles = recorded(&file);
         // Frame 1 lies at step 6.86.
         let objs = texts(&file, DataFormat::Obj, Some(35));
