@@ -6,12 +6,12 @@ use std::path::Path;
 use std::sync::Arc;
 use std::thread::{self, JoinHandle};
 
-use sim_contract::{LoadHeader, Stop, Triangle};
+use sim_contract::{LoadHeader, Stop};
 use sim_solver::{Scene, Solver};
 
 use crate::log::{
-    LoadRows, LogReader, ReadError, RepairError, RepairReport, SCENE_ATTACHMENT, SharedFile,
-    SurfaceRow, Topic, TopologyRow, bend_state, constraint_state, open_recording, repair_file,
+    BendColumns, LoadRows, LogReader, ReadError, RepairError, RepairReport, SCENE_ATTACHMENT,
+    SharedFile, SurfaceRow, Topic, TopologyRow, open_recording, repair_file,
 };
 
 /// Bytes that a repair writes at a time.
@@ -112,16 +112,12 @@ pub fn load_rows(report: &RepairReport) -> Option<LoadRows> {
         method: scene.solver.method as u32,
         ..LoadHeader::default()
     };
-    let constraints: Vec<_> = solver.constraints().map(constraint_state).collect();
-    let triangles: Vec<_> =
-        solver.triangles().iter().map(|corners| Triangle { corners: *corners }).collect();
-    let bends = solver.bends().filter(|_| lost.has_bends);
-    let bends: Vec<_> = bends.map(bend_state).collect();
-    let topology = TopologyRow::new(&header, &constraints, &bends);
-    Some(LoadRows {
-        topology: TopologyRow { torn: lost.torn.clone(), ..topology },
-        surface: SurfaceRow::new(&header, &triangles),
-    })
+    let mut topology = TopologyRow::of_solver(&header, &solver);
+    topology.torn.clone_from(&lost.torn);
+    if !lost.has_bends {
+        *topology.bends = BendColumns::default();
+    }
+    Some(LoadRows { topology, surface: SurfaceRow::of_solver(&header, &solver) })
 }
 
 #[cfg(test)]

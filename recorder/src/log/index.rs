@@ -29,7 +29,9 @@ use super::read::records::RecordReader;
 use super::run::RunDescription;
 use super::run::selection::ContentSelection;
 use super::topic::Topic;
-use chunk::{LocatedChunk, record_size_bytes};
+use chunk::LocatedChunk;
+pub(super) use chunk::record_size_bytes;
+pub(super) use summary::summary_start;
 
 /// A recording with random access to its chunks. Clones read the same file, also on other threads.
 #[derive(Debug, Clone)]

@@ -3,11 +3,10 @@
 use std::io::Write;
 
 use crate::log::{
-    Closing, CollidersRow, LogOptions, LogWriter, Message, OutcomeRow, ParametersRow,
-    RunDescription, SceneColliders, StepRow, SurfaceRow, TopologyRow, WriteError, bend_state,
-    constraint_state,
+    Closing, ColliderRow, LogOptions, LogWriter, Message, OutcomeRow, ParametersRow,
+    RunDescription, SceneColliders, StepRow, SurfaceRow, TopologyRow, WriteError,
 };
-use sim_contract::{LoadHeader, Outcome, ParameterValues, ParticleState, Reason, Triangle};
+use sim_contract::{LoadHeader, Outcome, ParameterValues, ParticleState, Reason};
 use sim_solver::{Applied, EnergyMeter, Scene, Solver};
 
 use super::frozen::{FrozenParticles, FrozenTracker};
@@ -50,9 +49,9 @@ pub(super) struct StateWriter {
     is_keyframe_due: bool,
     outcome_count: u64,
     first_step: u64,
-    /// The last written row.
-    colliders: CollidersRow,
-    /// The last written values.
+    /// The colliders of the last step.
+    colliders: Option<Vec<ColliderRow>>,
+    /// The parameters of the last step.
     parameters: Option<ParameterValues>,
     frozen: FrozenTracker,
     /// None unless the recording has the energy of each state.
@@ -71,14 +70,10 @@ impl StateWriter {
         let header = LoadHeader { method: run.method, ..LoadHeader::default() };
         // A command may have changed the constraints of the state.
         let loaded = Solver::new(scene);
-        let constraints: Vec<_> = loaded.constraints().map(constraint_state).collect();
-        let triangles: Vec<_> =
-            solver.triangles().iter().map(|corners| Triangle { corners: *corners }).collect();
-        let bends: Vec<_> = loaded.bends().map(bend_state).collect();
-        let topology = TopologyRow::new(&header, &constraints, &bends);
+        let topology = TopologyRow::of_solver(&header, &loaded);
         let topology = TopologyRow { torn: solver.torn().to_vec(), ..topology };
         log.write(&Message::Topology(topology), 0)?;
-        log.write(&Message::Surface(SurfaceRow::new(&header, &triangles)), 0)?;
+        log.write(&Message::Surface(SurfaceRow::of_solver(&header, solver)), 0)?;
         Ok(Self {
             run: run.clone(),
             outcomes: Vec::new(),
@@ -86,7 +81,7 @@ impl StateWriter {
             outcome_count: start.outcome_count,
             first_step: start.step,
             // A scene without colliders has no row.
-            colliders: CollidersRow { step: 0, colliders: Vec::new() },
+            colliders: Some(Vec::new()),
             parameters: None,
             frozen: FrozenTracker::default(),
             meter: log.selection().has_energy().then(|| EnergyMeter::of(solver)),
@@ -143,14 +138,10 @@ impl StateWriter {
         solver: &Solver,
         step: u64,
     ) -> Result<(), WriteError> {
-        if solver.collider_count() == 0 {
-            return Ok(());
-        }
         let row = colliders_row(solver, step);
-        if !solver.has_moving_colliders() && row.colliders == self.colliders.colliders {
+        if !changes(&mut self.colliders, &row.colliders) && !solver.has_moving_colliders() {
             return Ok(());
         }
-        self.colliders = row.clone();
         log.write(&Message::Colliders(row), self.run.time_of_step_ns(step))
     }
 
@@ -162,10 +153,9 @@ impl StateWriter {
         step: u64,
     ) -> Result<(), WriteError> {
         let values = solver.parameter_values();
-        if self.parameters.as_ref() == Some(&values) {
+        if !changes(&mut self.parameters, &values) {
             return Ok(());
         }
-        self.parameters = Some(values.clone());
         let row = ParametersRow { step, values };
         log.write(&Message::Parameters(row), self.run.time_of_step_ns(step))
     }
@@ -188,4 +178,13 @@ impl StateWriter {
         buffer.copy_from(particles);
         log.write_particles(step, buffer, time_ns)
     }
+}
+
+/// Returns `true` if a value differs from the last one, which it replaces.
+fn changes<T: Clone + PartialEq>(last: &mut Option<T>, now: &T) -> bool {
+    let is_changed = last.as_ref() != Some(now);
+    if is_changed {
+        *last = Some(now.clone());
+    }
+    is_changed
 }

@@ -2,12 +2,11 @@
 
 use std::io::Read;
 
-use sim_contract::{LoadHeader, Triangle};
+use sim_contract::LoadHeader;
 use sim_solver::{Scene, Solver};
 
 use crate::log::{
-    BENDS_VERSION, LogReader, Message, RunDescription, SurfaceRow, TopologyRow, bend_state,
-    constraint_state,
+    BENDS_VERSION, BendColumns, LogReader, Message, RunDescription, SurfaceRow, TopologyRow,
 };
 
 /// First version of the format that says which axis of the scene points up.
@@ -61,9 +60,7 @@ pub(super) fn compare_load(
     match message {
         Message::Topology(row) => compare_topology(row, run, format_version, solver),
         Message::Surface(row) => {
-            let triangles: Vec<_> =
-                solver.triangles().iter().map(|corners| Triangle { corners: *corners }).collect();
-            let expected = SurfaceRow::new(&LoadHeader::default(), &triangles).triangles;
+            let expected = SurfaceRow::of_solver(&LoadHeader::default(), solver).triangles;
             let place = first_difference(&row.triangles, &expected)?;
             Some(format!("/surface: triangle {} is not that of the scene", place / 3))
         }
@@ -83,25 +80,22 @@ fn compare_topology(
         method: run.method,
         ..LoadHeader::default()
     };
-    let constraints: Vec<_> = solver.constraints().map(constraint_state).collect();
-    let bends: Vec<_> = if format_version < BENDS_VERSION {
-        Vec::new()
-    } else {
-        solver.bends().map(bend_state).collect()
-    };
-    let expected =
-        TopologyRow { torn: row.torn.clone(), ..TopologyRow::new(&header, &constraints, &bends) };
+    let mut expected = TopologyRow::of_solver(&header, solver);
+    expected.torn.clone_from(&row.torn);
+    if format_version < BENDS_VERSION {
+        *expected.bends = BendColumns::default();
+    }
     if *row == expected {
         return None;
     }
-    let (found, expected) = (row.constraints(), expected.constraints());
-    let (Some(found), Some(expected)) = (found, expected) else {
+    let (found, constraints) = (row.constraints(), expected.constraints());
+    let (Some(found), Some(constraints)) = (found, constraints) else {
         return Some("/topology: its columns differ in length".to_owned());
     };
-    if let Some(place) = first_difference(&found, &expected) {
+    if let Some(place) = first_difference(&found, &constraints) {
         return Some(format!("/topology: constraint {place} is not that of the scene"));
     }
-    let Some(found) = row.bends() else {
+    let (Some(found), Some(bends)) = (row.bends(), expected.bends()) else {
         return Some("/topology: the columns of its bends differ in length".to_owned());
     };
     Some(match first_difference(&found, &bends) {

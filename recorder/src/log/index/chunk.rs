@@ -38,7 +38,7 @@ impl ChannelSet {
 }
 
 /// Returns the size of a record including its header. `bytes` starts with the header.
-pub(super) fn record_size_bytes(bytes: &[u8]) -> Option<u64> {
+pub(in crate::log) fn record_size_bytes(bytes: &[u8]) -> Option<u64> {
     let length: [u8; 8] = bytes.get(1..9)?.try_into().ok()?;
     u64::from_le_bytes(length).checked_add(RECORD_HEADER_SIZE_BYTES as u64)
 }

@@ -41,7 +41,10 @@ pub(super) fn read(
 }
 
 /// Returns the position of the index, from the footer.
-fn summary_start(file: &File, size_bytes: u64) -> Result<Option<u64>, ReadError> {
+pub(in crate::log) fn summary_start(
+    file: &File,
+    size_bytes: u64,
+) -> Result<Option<u64>, ReadError> {
     let Some(footer_start) = size_bytes.checked_sub(END_SIZE_BYTES as u64) else { return Ok(None) };
     let mut end = [0; END_SIZE_BYTES];
     file.read_exact_at(&mut end, footer_start)?;

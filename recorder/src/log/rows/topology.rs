@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use sim_contract::{
     BendState, ConstraintState, LoadHeader, PlainF32, Torn, TornConstraint, Triangle,
 };
-use sim_solver::Bend;
+use sim_solver::{Bend, Solver};
 
 /// The constraints of a scene in columns, and then its bends. The position in a column is the constraint's
 /// index.
@@ -150,6 +150,13 @@ impl TopologyRow {
         }
     }
 
+    /// Returns the row of a load, with the elements of a solver and no torn constraints.
+    pub(crate) fn of_solver(header: &LoadHeader, solver: &Solver) -> Self {
+        let constraints: Vec<_> = solver.constraints().map(constraint_state).collect();
+        let bends: Vec<_> = solver.bends().map(bend_state).collect();
+        Self::new(header, &constraints, &bends)
+    }
+
     /// Returns the memory of the columns, in bytes.
     pub(crate) fn size_bytes(&self) -> usize {
         let (Softness::Compliance(softness) | Softness::Stiffness(softness)) = &self.softness;
@@ -257,6 +264,11 @@ impl SurfaceRow {
     pub fn new(header: &LoadHeader, triangles: &[Triangle]) -> Self {
         let corners = triangles.iter().flat_map(|triangle| triangle.corners).collect();
         Self { step: header.step, triangles: corners }
+    }
+
+    /// Returns the row of a load, with the triangles of a solver.
+    pub(crate) fn of_solver(header: &LoadHeader, solver: &Solver) -> Self {
+        Self { step: header.step, triangles: solver.triangles().as_flattened().to_vec() }
     }
 
     /// Returns the triangles, or `None` if the number of indices is not a multiple of three.

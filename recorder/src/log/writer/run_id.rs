@@ -1,16 +1,16 @@
 //! Replaces the id of the run in a complete recording, for a run whose id follows from all of its commands.
 
 use std::fs::{File, OpenOptions};
-use std::io::{self, ErrorKind, Read, Seek, SeekFrom, Write};
+use std::io::{self, ErrorKind};
+use std::os::unix::fs::FileExt;
 use std::path::Path;
 
-use crate::log::run::RUN_METADATA;
+use mcap::MAGIC;
+use mcap::records::{Record, op};
 
-const MAGIC_SIZE_BYTES: u64 = 8;
-/// Number of the kind of a record, and its size.
-const RECORD_HEAD_SIZE_BYTES: u64 = 9;
-const METADATA: u8 = 0x0c;
-const FOOTER_SIZE_BYTES: u64 = RECORD_HEAD_SIZE_BYTES + 20;
+use crate::log::index::{record_size_bytes, summary_start};
+use crate::log::read::limits::RECORD_HEADER_SIZE_BYTES;
+use crate::log::run::RUN_METADATA;
 
 /// Replaces the id, which has as many digits as before, and the checksum that covers it.
 ///
@@ -20,46 +20,39 @@ pub(crate) fn replace_run_id(path: &Path, old: u64, new: u64) -> io::Result<()> 
     if old == new {
         return Ok(());
     }
-    let mut file = OpenOptions::new().read(true).write(true).open(path)?;
+    let file = OpenOptions::new().read(true).write(true).open(path)?;
     let [old, new] = [old, new].map(|id| format!("{id:016x}").into_bytes());
-    let start = find_run_id(&mut file, &old)?;
-    file.seek(SeekFrom::Start(start))?;
-    file.write_all(&new)?;
-    // The footer begins with the start of the summary, before which stands the checksum of all data.
-    file.seek(SeekFrom::End(-negative(
-        FOOTER_SIZE_BYTES + MAGIC_SIZE_BYTES - RECORD_HEAD_SIZE_BYTES,
-    )))?;
-    let summary = u64::from_le_bytes(read_array(&mut file)?);
-    let checksum_at = summary.checked_sub(4).ok_or(ErrorKind::InvalidData)?;
-    file.seek(SeekFrom::Start(checksum_at))?;
-    let checksum = u32::from_le_bytes(read_array(&mut file)?);
-    let data_end = checksum_at.checked_sub(RECORD_HEAD_SIZE_BYTES).ok_or(ErrorKind::InvalidData)?;
-    let after = data_end.checked_sub(start + new.len() as u64).ok_or(ErrorKind::InvalidData)?;
-    file.seek(SeekFrom::Start(checksum_at))?;
-    file.write_all(&(checksum ^ change(&old, &new, after)).to_le_bytes())
+    let id_at = find_run_id(&file, &old)?;
+    let summary = summary_start(&file, file.metadata()?.len())?.ok_or(ErrorKind::InvalidData)?;
+    // The record before the index is the end of the data, with the checksum of all bytes before it.
+    let mut checksum = [0; size_of::<u32>()];
+    let checksum_at = summary - checksum.len() as u64;
+    let data_end = checksum_at - RECORD_HEADER_SIZE_BYTES as u64;
+    file.read_exact_at(&mut checksum, checksum_at)?;
+    let change = change(&old, &new, data_end - (id_at + new.len() as u64));
+    file.write_all_at(&new, id_at)?;
+    file.write_all_at(&(u32::from_le_bytes(checksum) ^ change).to_le_bytes(), checksum_at)
 }
 
-/// Returns the place of the id in the metadata of the run.
-fn find_run_id(file: &mut File, id: &[u8]) -> io::Result<u64> {
-    let mut start = MAGIC_SIZE_BYTES;
+/// Returns the position of the id in the metadata of the run.
+fn find_run_id(file: &File, id: &[u8]) -> io::Result<u64> {
+    let mut start = MAGIC.len() as u64;
     loop {
-        file.seek(SeekFrom::Start(start))?;
-        let [kind] = read_array(file)?;
-        let size_bytes = u64::from_le_bytes(read_array(file)?);
-        start += RECORD_HEAD_SIZE_BYTES;
-        if kind == METADATA {
-            let mut metadata = Vec::new();
-            file.take(size_bytes).read_to_end(&mut metadata)?;
-            let is_run =
-                metadata.get(4..).is_some_and(|name| name.starts_with(RUN_METADATA.as_bytes()));
-            let key = b"run_id";
-            let found = metadata.windows(key.len()).position(|window| window == key);
-            // The length of the value stands between them.
-            let place = found.map(|place| place + key.len() + 4).filter(|_| is_run);
-            if let Some(place) = place
-                && metadata[place..].starts_with(id)
+        let mut record = vec![0; RECORD_HEADER_SIZE_BYTES];
+        file.read_exact_at(&mut record, start)?;
+        let size_bytes = record_size_bytes(&record).ok_or(ErrorKind::InvalidData)?;
+        if record[0] == op::METADATA {
+            record.resize(usize::try_from(size_bytes).unwrap_or(usize::MAX), 0);
+            file.read_exact_at(&mut record, start)?;
+            let body = &record[RECORD_HEADER_SIZE_BYTES..];
+            if let Ok(Record::Metadata(metadata)) = mcap::parse_record(op::METADATA, body)
+                && metadata.name == RUN_METADATA
             {
-                return Ok(start + place as u64);
+                // The length of the value precedes it.
+                let entry = [b"run_id", &[16, 0, 0, 0][..], id].concat();
+                let place = record.windows(entry.len()).position(|window| window == entry);
+                let place = place.ok_or(ErrorKind::InvalidData)?;
+                return Ok(start + (place + entry.len() - id.len()) as u64);
             }
         }
         start += size_bytes;
@@ -73,17 +66,6 @@ fn change(old: &[u8], new: &[u8], after: u64) -> u32 {
     let mut shifted = crc32fast::Hasher::new_with_initial_len(difference, old.len() as u64);
     shifted.combine(&crc32fast::Hasher::new_with_initial_len(0, after));
     shifted.finalize()
-}
-
-fn read_array<const N: usize>(file: &mut File) -> io::Result<[u8; N]> {
-    let mut bytes = [0; N];
-    file.read_exact(&mut bytes)?;
-    Ok(bytes)
-}
-
-#[allow(clippy::cast_possible_wrap, reason = "the size of a footer")]
-fn negative(size_bytes: u64) -> i64 {
-    size_bytes as i64
 }
 
 #[cfg(test)]
