@@ -64,16 +64,25 @@ pub(crate) fn warn_incomplete(path: &Path, end: &LogEnd, done: &str) {
     }
 }
 
-/// Warns about a name by which other programs, and `viewer-bridge`, do not find a recording.
-pub(crate) fn warn_of_extension(path: &Path) {
-    // What is no file is refused later, which says enough.
-    let is_other = std::fs::metadata(path).is_ok_and(|found| !found.is_file());
-    if !is_other && path.extension().is_none_or(|one| !one.eq_ignore_ascii_case("mcap")) {
-        note(&format!(
-            "warning: programs expect a recording to end in .mcap, unlike {}",
-            path_text(path)
-        ));
+/// Warns about a file that has another extension than its format, because other programs, and
+/// `viewer-bridge`, do not find it.
+pub(crate) fn warn_of_extension(path: &Path, expected: &[&str]) {
+    if let Some(warning) = extension_warning(path, expected) {
+        note(&warning);
     }
+}
+
+fn extension_warning(path: &Path, expected: &[&str]) -> Option<String> {
+    let first = expected.first()?;
+    let extension = path.extension().unwrap_or_default();
+    let is_known = expected.iter().any(|known| extension.eq_ignore_ascii_case(known));
+    // Stdout, a device and a folder need no extension, or are refused later.
+    let is_file =
+        path != Path::new("-") && std::fs::metadata(path).map_or(true, |found| found.is_file());
+    let path = path_text(path);
+    (!is_known && is_file).then(|| {
+        format!("warning: programs expect a file of this format to end in .{first}, unlike {path}")
+    })
 }
 
 /// Describes what is left of a recording after an error of writing.
@@ -92,4 +101,28 @@ pub(crate) fn incomplete(recording: &str, part_path: &Path) -> String {
 /// Returns a path as text for users.
 pub(crate) fn path_text(path: &Path) -> String {
     path.display().to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_with_the_extension_of_another_format_causes_a_warning() {
+        let warning = |path, expected: &[&str]| extension_warning(Path::new(path), expected);
+        assert_eq!(
+            warning("x.abc", &["pc2"]).unwrap(),
+            "warning: programs expect a file of this format to end in .pc2, unlike x.abc"
+        );
+        assert!(warning("run", &["mcap"]).is_some());
+        for (path, expected) in [
+            ("cache.PC2", &["pc2"][..]),
+            ("run.apng", &["png", "apng"]),
+            ("/dev/stdout", &["csv"]),
+            ("-", &["csv"]),
+            ("folder.of.files", &[]),
+        ] {
+            assert_eq!(warning(path, expected), None, "{path}");
+        }
+    }
 }

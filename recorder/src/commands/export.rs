@@ -134,9 +134,7 @@ pub(crate) fn run(args: &ExportArgs) -> anyhow::Result<Exit> {
     let needed = log.selection().require_all_particles("`recorder export`");
     needed.with_context(|| path.clone())?;
     let format = args.format.format().context("one of the formats is required")?;
-    if let Some(warning) = format.extension_warning() {
-        output::note(&warning);
-    }
+    output::warn_of_extension(format.target(), format.extensions());
     refuse_own_input(&open_regular_file(&args.file)?, format.target())?;
     let mut survey = survey(args, log, &path)?;
     let saves_more = |parts: &IntactParts| parts.snapshot_count() > survey.steps.len() as u64;

@@ -62,7 +62,7 @@ const IGNORED_SIGNAL: &str = "warning: SIGUSR1 writes the memory of a black box,
 pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
     args.check().unwrap_or_else(|error| exit::with_usage(&error));
     if let Some(output) = &args.output {
-        output::warn_of_extension(output);
+        output::warn_of_extension(output, &["mcap"]);
     }
     let stop = Stop::install()?;
     report_bus_errors()?;

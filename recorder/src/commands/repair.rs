@@ -69,7 +69,7 @@ struct Repaired<'a> {
 }
 
 pub(crate) fn run(args: &RepairArgs) -> anyhow::Result<Exit> {
-    output::warn_of_extension(&args.output);
+    output::warn_of_extension(&args.output, &["mcap"]);
     let stop = Stop::install()?;
     let (input, output) = (output::path_text(&args.input), output::path_text(&args.output));
     let open =

@@ -106,7 +106,7 @@ pub(crate) fn run(args: &SimulateArgs) -> anyhow::Result<Exit> {
         with_usage(&clap::Error::raw(ErrorKind::ArgumentConflict, problem));
     }
     if let Some(output) = &args.output {
-        output::warn_of_extension(output);
+        output::warn_of_extension(output, &["mcap"]);
     }
     let stop = Stop::install()?;
     match args.steps {

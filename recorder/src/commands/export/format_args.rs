@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 
 use super::data::DataFormat;
-use crate::cli::output::path_text;
 use crate::export::data::written_files::is_stdout;
 use crate::export::pictures::target::PictureFormat;
 
@@ -72,18 +71,8 @@ impl Format<'_> {
         }
     }
 
-    /// Returns a warning if the file has the extension of another format.
-    pub(super) fn extension_warning(&self) -> Option<String> {
-        let expected = self.extensions();
-        let extension = self.target().extension()?;
-        let is_known = expected.iter().any(|known| extension.eq_ignore_ascii_case(known));
-        let first = expected.first().filter(|_| !is_known)?;
-        let target = path_text(self.target());
-        Some(format!("warning: programs expect the extension .{first} for the format of {target}"))
-    }
-
     /// Returns the extensions of the file; none for a folder.
-    fn extensions(&self) -> &'static [&'static str] {
+    pub(super) fn extensions(&self) -> &'static [&'static str] {
         match self {
             // An animation is a PNG file, which has either extension.
             Self::Animation(_) => &["png", "apng"],
@@ -128,30 +117,5 @@ impl FormatArgs {
             .filter_map(|(path, format)| Some(Format::Data(format, path.as_deref()?)));
         let animation = self.apng.as_deref().map(Format::Animation);
         pictures.chain(animation).chain(data).next()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_file_with_the_extension_of_another_format_causes_a_warning() {
-        let warning =
-            |format: DataFormat, path| Format::Data(format, Path::new(path)).extension_warning();
-        assert_eq!(
-            warning(DataFormat::Pc2, "x.abc").unwrap(),
-            "warning: programs expect the extension .pc2 for the format of x.abc"
-        );
-        assert!(warning(DataFormat::Npz, "run.csv").is_some());
-        for (format, path) in [
-            (DataFormat::Pc2, "cache.PC2"),
-            (DataFormat::Csv, "/dev/stdout"),
-            (DataFormat::Vtk, "folder.of.files"),
-        ] {
-            assert_eq!(warning(format, path), None, "{path}");
-        }
-        let animation = |path| Format::Animation(Path::new(path)).extension_warning();
-        assert!(animation("run.png").is_none() && animation("run.gif").is_some());
     }
 }
