@@ -202,8 +202,8 @@ fn the_prose_check_finds_faults() {
 /// Returns true if a line of code has the keyword `unsafe`.
 fn is_unsafe(line: &str) -> bool {
     let code = line.split("//").next().unwrap_or(line);
-    let follows =
-        |rest: &str| ["{", "fn ", "impl ", "extern "].iter().any(|one| rest.starts_with(one));
+    let words = ["{", "fn ", "impl ", "impl<", "trait ", "extern "];
+    let follows = |rest: &str| words.iter().any(|one| rest.starts_with(one));
     code.contains("#[unsafe(") || code.split("unsafe ").skip(1).any(follows)
 }
 
@@ -242,9 +242,14 @@ fn unsafe_code_is_where_the_architecture_says() {
 
 #[test]
 fn the_check_for_unsafe_code_finds_it() {
-    for line in
-        ["unsafe { a }", "pub unsafe fn a()", "#[unsafe(no_mangle)]", "unsafe impl A for B {}"]
-    {
+    for line in [
+        "unsafe { a }",
+        "pub unsafe fn a()",
+        "#[unsafe(no_mangle)]",
+        "unsafe impl A for B {}",
+        "unsafe impl<T> A for B<T> {}",
+        "pub unsafe trait A {",
+    ] {
         assert!(is_unsafe(line), "{line}");
     }
     for line in ["// unsafe { a }", "#![forbid(unsafe_code)]", "fn is_unsafe(a: char)"] {
