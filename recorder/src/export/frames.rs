@@ -86,7 +86,7 @@ impl Snapshots<'_> {
             let place = grid.scaled_frame(*number);
             let next = self.steps.partition_point(|step| grid.scaled_place(*step) < place);
             let (before, after) = (self.steps[next.saturating_sub(1)], self.steps[next]);
-            grid.scaled_place(after) != place && self.is_continuous(before, after)
+            grid.scaled_place(after) != place && self.is_continuous([before, after])
         };
         self.frame_numbers().iter().filter(|number| is_interpolated(number)).count()
     }
@@ -105,27 +105,16 @@ impl Snapshots<'_> {
             });
         };
         let mut number = 0;
-        let mut add = |number, is_interpolated, state: &SceneState| {
-            add(&Frame { number, time_s: grid.time_s(number), is_interpolated, state })
-        };
         // The snapshot before, if a frame lies between it and the next one.
         let mut before = None::<SceneState>;
         self.for_each(|after| {
             let step = after.row.step;
             if let Some(before) = before.take() {
-                let is_interpolated = self.is_continuous(before.row.step, step);
-                let mut state = before.clone();
-                while grid.scaled_frame(number) < grid.scaled_place(step) {
-                    if is_interpolated {
-                        let share = grid.share(number, [before.row.step, step]);
-                        interpolate(&mut state, [&before, after], share);
-                    }
-                    add(number, is_interpolated, &state)?;
-                    number += 1;
-                }
+                number = self.add_between(grid, number, [&before, after], &mut add)?;
             }
             if grid.scaled_frame(number) == grid.scaled_place(step) {
-                add(number, false, after)?;
+                let time_s = grid.time_s(number);
+                add(&Frame { number, time_s, is_interpolated: false, state: after })?;
                 number += 1;
             }
             let next = self.steps.get(self.steps.partition_point(|one| *one <= step));
@@ -134,6 +123,28 @@ impl Snapshots<'_> {
             before = is_needed.then(|| after.clone());
             Ok(())
         })
+    }
+
+    /// Adds the frames between two snapshots, from `number` on. Returns the number of the next frame.
+    fn add_between(
+        &self,
+        grid: FrameGrid,
+        mut number: u64,
+        [before, after]: [&SceneState; 2],
+        add: &mut impl FnMut(&Frame<'_>) -> anyhow::Result<()>,
+    ) -> anyhow::Result<u64> {
+        let steps = [before.row.step, after.row.step];
+        let is_interpolated = self.is_continuous(steps);
+        let mut state = before.clone();
+        while grid.scaled_frame(number) < grid.scaled_place(after.row.step) {
+            if is_interpolated {
+                interpolate(&mut state, [before, after], grid.share(number, steps));
+            }
+            let time_s = grid.time_s(number);
+            add(&Frame { number, time_s, is_interpolated, state: &state })?;
+            number += 1;
+        }
+        Ok(number)
     }
 }
 

@@ -52,15 +52,8 @@ impl Snapshots<'_> {
     }
 
     /// Returns `true` if a motion leads from the state of one step to that of a later one.
-    pub(crate) fn is_continuous(&self, from: u64, to: u64) -> bool {
+    pub(crate) fn is_continuous(&self, [from, to]: [u64; 2]) -> bool {
         self.replaced_at.range(from + 1..=to).next().is_none()
-    }
-
-    /// Returns the outcomes of commands that a state adds. The first selected snapshot adds those of its step.
-    pub(crate) fn outcomes<'s>(&self, state: &'s SceneState) -> &'s [OutcomeRow] {
-        // They are in the order of their steps.
-        let end = state.outcomes.partition_point(|row| row.step <= state.row.step);
-        &state.outcomes[..end]
     }
 
     /// Reads the selected snapshots from first to last.
@@ -101,4 +94,11 @@ impl Snapshots<'_> {
         }
         Ok(())
     }
+}
+
+/// Returns the outcomes of commands that a state adds. The first selected snapshot adds those of its step.
+pub(crate) fn new_outcomes(state: &SceneState) -> &[OutcomeRow] {
+    // They are in the order of their steps.
+    let end = state.outcomes.partition_point(|row| row.step <= state.row.step);
+    &state.outcomes[..end]
 }

@@ -11,7 +11,7 @@ use sim_contract::{ParticleState, PlainF32};
 use zip::write::{SimpleFileOptions, StreamWriter};
 use zip::{DateTime, ZipWriter};
 
-use crate::export::snapshots::Snapshots;
+use crate::export::snapshots::{Snapshots, new_outcomes};
 
 /// The header of an array is padded to a multiple of this, so that its numbers are aligned.
 const HEADER_ALIGNMENT: usize = 64;
@@ -149,7 +149,7 @@ impl Survey {
     fn read(snapshots: &Snapshots<'_>) -> anyhow::Result<Self> {
         let mut survey = Self::default();
         snapshots.for_each(|state| {
-            survey.commands.extend_from_slice(snapshots.outcomes(state));
+            survey.commands.extend_from_slice(new_outcomes(state));
             if let Some(row) = &state.forces {
                 survey.has_forces = true;
                 survey.collider_count = row.colliders.len();

@@ -16,7 +16,7 @@ use sim_contract::ParticleState;
 
 use super::written_files::WrittenFiles;
 use crate::export::frame_names::FrameNames;
-use crate::export::snapshots::Snapshots;
+use crate::export::snapshots::{Snapshots, new_outcomes};
 use cdr::CdrMessage;
 use schemas::{MessageType, POINT_CLOUD, STRING, TRANSFORMS};
 
@@ -97,7 +97,7 @@ fn write_messages(snapshots: &Snapshots<'_>, out: &mut dyn Write) -> anyhow::Res
     let first = header(transforms, snapshots.steps[0]);
     file.write_to_known_channel(&first, &transform(snapshots, first.log_time))?;
     snapshots.for_each(|state| {
-        for row in snapshots.outcomes(state) {
+        for row in new_outcomes(state) {
             let message = text_message(&serde_json::to_string(row)?);
             file.write_to_known_channel(&header(outcomes, row.step), &message)?;
             counts.outcomes += 1;

@@ -150,7 +150,7 @@ fn a_series_whose_numbers_are_far_apart_is_refused() {
     };
     let error = after(20_240_101).unwrap_err().to_string();
     assert!(error.contains("run_20240101.mcap: its number is too far from 1"), "{error}");
-    // Such a number is no number of ours.
+    // A number this large belongs to a file of another program.
     assert_eq!(after(4_000_000_000).unwrap(), folder.0.join("run_0002.mcap"));
 }
 
