@@ -392,6 +392,38 @@ fn frames_are_evenly_spaced_and_interpolated_between_snapshots() {
     assert!(vtk["line.pvd"].contains("timestep=\"0.03\" part=\"0\" file=\"line_00000003.vtp\""));
 }
 
+#[test]
+fn velocities_and_colliders_are_interpolated_as_positions_are() {
+    // The collider moves by 0.1 m in each step. Frame 1 lies at step 2.4, and frame 5 at step 12.
+    let collider = "[[collider]]\nshape = \"sphere\"\ncenter = [0, -30, 0]\nradius = 0.5\nvelocity = [24, 0, 0]\n";
+    let file = record(&format!("{ROPE}\n{collider}"), 12);
+    let particles = recorded(&file);
+    let stage = stage(&file, Some(100));
+    let samples = |attribute: &str| {
+        let (_, samples) = stage.split_once(&format!("{attribute}.timeSamples = {{\n")).unwrap();
+        let lines = samples.lines().take(6).map(str::trim).map(str::to_owned);
+        lines.collect::<Vec<_>>()
+    };
+    let numbers = |line: &str| -> Vec<f32> {
+        let parts = line.split(|letter| "()[], :".contains(letter)).filter(|part| !part.is_empty());
+        parts.map(|part| part.parse().unwrap()).collect()
+    };
+    let velocities = numbers(&samples("vector3f[] velocities")[1]);
+    for particle in 0..4 {
+        let at = |step: usize| particles[step * 4 + particle].velocity;
+        let ([from, to], found) = ([at(2), at(3)], &velocities[1 + 3 * particle..]);
+        for axis in 0..3 {
+            let expected = from[axis] + (to[axis] - from[axis]) * 0.4;
+            let error = (found[axis] - expected).abs();
+            assert!(error <= 1e-4 * expected.abs().max(1e-3), "{found:?} {from:?} {to:?}");
+        }
+    }
+    for (frame, pose) in samples("matrix4d xformOp:transform").iter().enumerate() {
+        let pose = numbers(pose);
+        assert!((pose[13] - 0.24 * frame as f32).abs() < 1e-5, "{frame}: {pose:?}");
+    }
+}
+
 /// Copies a recording, with further messages before the snapshots of their steps.
 fn with_messages(file: &[u8], further: impl Fn(u64) -> Option<Message>) -> Vec<u8> {
     let mut log = LogReader::new(file).unwrap();
@@ -519,4 +551,30 @@ fn a_copy_for_viewers_is_a_recording_with_the_same_content() {
         foxglove::write(snapshots, &mut Vec::new()).unwrap_err().to_string()
     });
     assert_eq!(twice, "has /scene already; export the recording that it is a copy of");
+}
+
+#[test]
+fn a_copy_of_a_damaged_recording_has_what_is_intact_and_declares_the_rest() {
+    let mut file = record(TINY, 200);
+    let snapshot_count = recorded(&file).len();
+    let middle = file.len() / 2;
+    file[middle] ^= 1;
+    let folder = Folder::new("damaged");
+    let path = folder.0.join("a.mcap");
+    fs::write(&path, file).unwrap();
+    let parts = IntactParts::find(&path, &Stop::install().unwrap()).unwrap();
+    let mut repaired = Vec::new();
+    parts.bytes().unwrap().read_to_end(&mut repaired).unwrap();
+    let copy = written(&repaired, foxglove::write);
+    assert_eq!(recorded(&copy), recorded(&repaired));
+    assert!((1..snapshot_count).contains(&recorded(&copy).len()));
+    let checked = recorder::check_file(Cursor::new(&copy), None, &mut |_, _| {}).unwrap();
+    assert_eq!(checked.findings.list(), []);
+    let closing = |file: &[u8]| {
+        let mut log = LogReader::new(file).unwrap();
+        while log.next_message().unwrap().is_some() {}
+        log.closing().unwrap().missing()
+    };
+    assert!(closing(&copy)["/particles"] > 0);
+    assert_eq!(closing(&copy), closing(&repaired));
 }

@@ -7,6 +7,7 @@ use sim_contract::SnapshotFlags;
 use super::*;
 use crate::commands::record::feed::Feed;
 use crate::commands::record::queue::{Entry, Queue};
+use crate::commands::record::report::{Report, Written};
 use crate::commands::record::split::{SplitArgs, WritePosition};
 
 /// Ends the file before a state of [`Node::new`]. `messages` have arrived before it. Returns the last
@@ -199,4 +200,11 @@ fn what_no_file_declares_is_in_the_report() {
     let undeclared = feed.undeclared();
     assert_eq!(undeclared[Topic::Steps].gaps, 9);
     assert_eq!(undeclared[Topic::Outcomes].gaps, 9);
+    let mut written = Written::default();
+    written.add_undeclared(&undeclared);
+    let report = Report::new(&written, 0, "signal".to_owned());
+    assert!(!report.is_complete());
+    let text = report.to_string();
+    let lost = "lost        /outcomes 9\nlost        /particles 9\nlost        /steps 9\n";
+    assert!(text.contains(lost), "{text}");
 }
