@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
-use integration_tests::{Finished, Process, Program, Sandbox, ctl, record, wait_for};
+use integration_tests::{
+    Finished, Process, Program, Sandbox, Stream, Streams, ctl, record, wait_for,
+};
 use recorder::{LogEnd, LogReader};
 
 /// Limit on the size of files: several chunks, and less than any of the recordings here.
@@ -116,6 +118,26 @@ fn an_export_to_stdout_prints_its_result_on_stderr() {
     }
     let refused = recorder(&sandbox, &["export", &file, "--pc2", "-"]);
     assert_eq!((refused.code, refused.stdout.as_str()), (Some(1), ""), "{refused:?}");
+}
+
+#[test]
+fn an_export_to_stdout_ends_quietly_with_its_reader_and_fails_on_a_full_disk() {
+    let sandbox = Sandbox::new();
+    let file = sandbox.path("run.mcap");
+    recorder(&sandbox, &["simulate", "rope", "--steps", "200", "-o", &file]).success();
+    for option in ["--npz", "--csv", "--usda", "--foxglove"] {
+        let export = |stdout| {
+            let streams = Streams { stdout, ..Streams::default() };
+            let args = ["export", &file, option, "-"];
+            Process::start_with(streams, Program::Recorder, &sandbox, &args).wait()
+        };
+        let without_reader = export(Stream::ClosedPipe);
+        assert_eq!(without_reader.code, Some(0), "{option}: {without_reader:?}");
+        assert!(!without_reader.stderr.contains("error"), "{option}: {without_reader:?}");
+        let full = export(Stream::Full);
+        assert_eq!(full.code, Some(1), "{option}: {full:?}");
+        assert!(full.stderr.contains("No space left on device"), "{option}: {full:?}");
+    }
 }
 
 #[test]
