@@ -30,16 +30,16 @@ pub enum SceneStateError {
     /// Columns of /topology differ in length.
     #[error("the columns of /topology differ in length")]
     Topology,
-    /// /surface has part of a triangle.
+    /// The last triangle of /surface has fewer than three corners.
     #[error("the number of indices in /surface is not a multiple of three")]
     Surface,
-    /// A torn constraint does not exist.
+    /// The recording has a torn constraint that /topology does not list.
     #[error("constraint {constraint} is torn but not in /topology")]
     Torn {
-        /// Its index.
+        /// Index of the constraint.
         constraint: u32,
     },
-    /// A constraint or a triangle has an end that does not exist.
+    /// A constraint or a triangle refers to a particle that the snapshot does not have.
     #[error(
         "the snapshot of step {step} has {count} particles, but /topology or /surface refers to particle {index}"
     )]
@@ -66,14 +66,14 @@ pub struct SceneState {
     pub is_torn: Vec<bool>,
     /// The triangles as loaded.
     pub triangles: Vec<Triangle>,
-    /// The sides of the triangles. None if nothing has torn yet.
+    /// The torn sides of the triangles. `None` if no constraint has torn yet.
     pub sides: Option<TornSides>,
-    /// In their poses after the step.
+    /// The colliders, in their poses after the step.
     pub colliders: Vec<ColliderRow>,
-    /// The triangles of the colliders, once one of them is a mesh.
+    /// The triangles of the colliders that are meshes. `None` if no collider is a mesh.
     pub collider_meshes: Option<Arc<ColliderMeshes>>,
-    /// The outcomes of commands from the first visited step on that no visited state before contains. Some may be
-    /// those of later steps.
+    /// The outcomes of commands since the last visited state, from the first visited step on. A recording may have
+    /// outcomes of later steps before the snapshot, which are included.
     pub outcomes: Vec<OutcomeRow>,
     /// The forces of the step, if the recording has them.
     pub forces: Option<ForcesRow>,
@@ -118,7 +118,7 @@ pub fn visit_states<R: Read, E: From<SceneStateError>>(
             if visit(&state)?.is_break() {
                 break;
             }
-            // A batch of the recorder may contain outcomes of later steps.
+            // The recorder writes outcomes in batches, which may contain those of later steps.
             let step = state.row.step;
             state.outcomes.retain(|row| row.step > step);
         }
@@ -211,7 +211,8 @@ impl SceneState {
         Ok(())
     }
 
-    /// Reads the triangles from the scene of the recording. Without a readable scene, there are none.
+    /// Reads the triangles of colliders from the scene of the recording. Without a readable scene, the state has no
+    /// triangles of colliders.
     fn read_meshes<R: Read>(&mut self, log: &LogReader<R>) {
         if self.collider_meshes.is_none() && self.has_meshes() {
             let meshes = recorded_scene(log).map(|scene| scene.collider_meshes());
@@ -231,7 +232,7 @@ impl SceneState {
     /// Replaces the torn constraints.
     ///
     /// # Errors
-    /// The first that is not in the topology.
+    /// If a torn constraint is not in the topology. The error names the first one.
     pub fn set_torn(&mut self, torn: impl Iterator<Item = u32>) -> Result<(), SceneStateError> {
         self.is_torn.clear();
         self.is_torn.resize(self.constraints.len(), false);
@@ -291,7 +292,7 @@ impl SceneState {
     /// Checks that all constraints and triangles refer to existing particles.
     ///
     /// # Errors
-    /// The first that does not.
+    /// If a constraint or a triangle refers to a particle that does not exist. The error names the largest index.
     pub fn check_indices(&self) -> Result<(), SceneStateError> {
         let ends = self.constraints.iter().flat_map(|constraint| [constraint.a, constraint.b]);
         let corners = self.triangles.iter().flat_map(|triangle| triangle.corners);

@@ -119,7 +119,7 @@ pub(crate) struct ExportArgs {
 enum StyleArg {
     /// Particles, constraints and triangles
     Wires,
-    /// Smooth surfaces; only where there is none, structural constraints and loose particles
+    /// Smooth surfaces and, where there is no surface, structural constraints and loose particles
     Shaded,
 }
 

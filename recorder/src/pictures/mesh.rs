@@ -52,21 +52,21 @@ pub(crate) struct MeshDrawing<'a> {
     pub(crate) style: Style,
 }
 
-/// The drawn part of the particles, constraints and triangles.
+/// The way in which particles, constraints and triangles are drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Style {
-    /// All of them.
+    /// All particles, constraints and triangles.
     Wires(Bend),
-    /// Smooth surfaces. Of the rest only structural constraints and loose particles, where there is no surface.
+    /// Triangles as smooth surfaces and, where there is no surface, structural constraints and loose particles.
     Shaded,
 }
 
 /// The handling of bend constraints.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Bend {
-    /// Draws them.
+    /// Draws bend constraints.
     Draw,
-    /// Leaves them out.
+    /// Leaves bend constraints out.
     Hide,
 }
 

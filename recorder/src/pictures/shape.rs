@@ -14,16 +14,16 @@ pub struct Size {
 /// A picture as shapes from back to front.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Picture {
-    /// Its size.
+    /// Width and height.
     pub size: Size,
-    /// From back to front.
+    /// The shapes, from back to front.
     pub shapes: Vec<Shape>,
 }
 
-/// Red, green, blue.
+/// A color in sRGB.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Color(
-    /// The three parts.
+    /// Red, green and blue.
     pub [u8; 3],
 );
 
@@ -33,18 +33,18 @@ pub const BACKGROUND: Color = Color([0xf8, 0xf8, 0xf5]);
 /// The style of a line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stroke {
-    /// Its color.
+    /// Color of the line.
     pub color: Color,
-    /// In pixels.
+    /// Width in pixels.
     pub width: f64,
-    /// Its dashes.
+    /// Dash pattern.
     pub dash: Dash,
 }
 
 /// The dash pattern of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Dash {
-    /// None.
+    /// A line without gaps.
     Solid,
     /// Dashes as long as the gaps between them.
     Dashed,
@@ -57,29 +57,29 @@ pub enum Dash {
 pub enum Shape {
     /// A filled polygon.
     Polygon {
-        /// In order around it.
+        /// Corners in their order along the boundary.
         corners: Vec<DVec2>,
-        /// Color inside.
+        /// Color of the inside.
         fill: Color,
-        /// Line around it.
+        /// Line along the boundary, if there is one.
         outline: Option<Stroke>,
     },
     /// A straight line.
     Segment {
-        /// Its ends.
+        /// End points.
         ends: [DVec2; 2],
-        /// Its line.
+        /// Style of the line.
         stroke: Stroke,
     },
     /// A filled circle.
     Circle {
-        /// Its center.
+        /// Center.
         center: DVec2,
-        /// Its radius.
+        /// Radius in pixels.
         radius: f64,
-        /// Color inside.
+        /// Color of the inside.
         fill: Color,
-        /// Line around it.
+        /// Line along the boundary, if there is one.
         outline: Option<Stroke>,
     },
     /// A line of text.
@@ -93,9 +93,9 @@ pub struct Text {
     pub corner: DVec2,
     /// Side of a cell in pixels.
     pub cell: u32,
-    /// Its color.
+    /// Color of the letters.
     pub color: Color,
-    /// The letters.
+    /// The text.
     pub line: String,
 }
 
@@ -121,7 +121,7 @@ impl Stroke {
 }
 
 impl Shape {
-    /// Returns `true` if all coordinates are finite and within `COORDINATE_MAX`.
+    /// Returns `true` if all coordinates are finite and below `COORDINATE_MAX`.
     pub fn is_drawable(&self) -> bool {
         let is_near =
             |point: &DVec2| point.is_finite() && point.abs().max_element() < COORDINATE_MAX;

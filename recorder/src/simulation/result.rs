@@ -10,7 +10,7 @@ use super::job::Start;
 /// The result of a simulation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SimulationResult {
-    /// Index of the first outcome.
+    /// Index in `/outcomes` of the first command of the simulation.
     first_index: u64,
     /// The last computed step.
     pub steps: u64,
@@ -20,22 +20,22 @@ pub struct SimulationResult {
     pub applied_count: u64,
     /// Number of rejected commands.
     pub rejected_count: u64,
-    /// The first rejected commands, at most 5.
+    /// The outcomes of the first 5 rejected commands.
     pub rejections: Vec<Outcome>,
-    /// The steps that left contacts out, because particles were piled up too densely.
+    /// The steps that computed only a part of the contacts, because particles were piled up too densely.
     pub incomplete_contacts: Option<StepCount>,
 }
 
-/// Some steps.
+/// The number of steps with a property, and the first of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct StepCount {
-    /// The first one.
+    /// The first of the steps.
     pub first_step: u64,
-    /// Their number.
+    /// Number of the steps.
     pub count: u64,
 }
 
-/// Most rejected commands to report one by one.
+/// Most outcomes of rejected commands that a result lists.
 const REJECTIONS_SHOWN_MAX: usize = 5;
 
 impl SimulationResult {

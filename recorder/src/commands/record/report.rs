@@ -15,9 +15,9 @@ pub(crate) struct Written {
     /// The newest file.
     last_path: PathBuf,
     file_count: u64,
-    /// Number of the files of the ring that were removed, those of earlier recordings included.
+    /// Number of files that the ring has removed, including files of earlier recordings.
     pub(crate) removed_count: u64,
-    /// The sums of the counts of all files.
+    /// The counts of all files, added up.
     total: Closing,
     /// First and last recorded step.
     steps: Option<(u64, u64)>,
@@ -57,9 +57,9 @@ impl Written {
 pub(crate) struct Report {
     /// The newest file, if there is one.
     output: Option<String>,
-    /// Number of written files, with those that were removed again.
+    /// Number of written files, including files that the ring has removed again.
     files: u64,
-    /// Number of the files of the ring that were removed, those of earlier recordings included.
+    /// Number of files that the ring has removed, including files of earlier recordings.
     removed_files: u64,
     first_step: Option<u64>,
     last_step: Option<u64>,
@@ -67,7 +67,7 @@ pub(crate) struct Report {
     snapshots: u64,
     /// Number of recorded outcomes.
     outcomes: u64,
-    /// Number of missing messages, for topics that have any, and "unreadable" ones.
+    /// Number of missing messages by topic, and of messages that could not be read as "unreadable".
     lost: BTreeMap<&'static str, u64>,
     /// The part of the lost snapshots that came before the first keyframe.
     before_first_keyframe: u64,

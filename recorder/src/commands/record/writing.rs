@@ -203,7 +203,7 @@ impl Files {
         Ok(())
     }
 
-    /// Adds a file to the ring, if this is one, and removes those that are too many.
+    /// Adds a file to the ring of a recording that has one, and removes the oldest files beyond the limit of the ring.
     fn trim_ring(&mut self, number: u64) {
         let ring = self.options.ring;
         if ring.is_given() && !self.options.names.is_single() {
@@ -216,9 +216,9 @@ impl Files {
         self.keep_reserve();
     }
 
-    /// If less than the reserve is free, removes the oldest file of a ring, but not the one in progress, and
-    /// ends the recording of a single file. Removes only one at a time, because some file systems show its
-    /// space as free only seconds later.
+    /// If less than the reserve is free, removes the oldest file of a ring, but not the file in progress, or ends the
+    /// recording of a single file. Each call removes at most one file, because some file systems show its space as
+    /// free only seconds later.
     fn keep_reserve(&mut self) {
         let names = &self.options.names;
         if !self.options.ring.is_short(&names.path(0)) {
@@ -237,8 +237,8 @@ impl Files {
         }
     }
 
-    /// Removes the oldest file of the ring, unless another program has moved it. One that cannot be removed
-    /// stays, because the newest data matter most. Returns `true` if a file was removed.
+    /// Removes the oldest file of the ring, unless another program has moved it. If the file cannot be removed, it
+    /// stays and the recording goes on, because the newest data matter most. Returns `true` if a file was removed.
     fn remove_oldest(&mut self) -> bool {
         let Some(path) = self.ring.pop_front() else { return false };
         match fs::remove_file(&path) {

@@ -1,4 +1,4 @@
-//! Files that follow each other: every message between two of them is in one, or declared.
+//! Files that follow each other: a message between two files is in one of them, or one of them declares it as missing.
 
 use std::sync::Arc;
 
@@ -142,8 +142,8 @@ fn feed_load(feed: &mut Feed, node: &mut Node, header: SnapshotHeader) {
     feed.accept_messages(Messages::default());
 }
 
-/// Writes everything that waits. Returns the numbers of recorded and of missing snapshots that the ends of
-/// files declare, and those of missing outcomes.
+/// Empties the queue. Returns the numbers of recorded snapshots, of missing snapshots and of missing outcomes that
+/// the ends of files declare.
 fn drain(queue: &Queue) -> [u64; 3] {
     let mut sums = [0; 3];
     while let Some(entry) = queue.pop() {
