@@ -259,15 +259,25 @@ impl Recording {
         #[pyo3(from_py_with = arguments::step)] step: u64,
     ) -> PyResult<Forces> {
         self.require_step(step)?;
-        let row = self.read(py, |tape| tape.forces_at(step))?;
-        let row = row.ok_or_else(|| {
+        self.forces_if_recorded(py, step)?.ok_or_else(|| {
             RecordingError::new_err(format!(
                 "{} has no forces of step {step}: `recorder record --forces` and `recorder simulate --forces` \
                  write those of each step but the first",
                 self.path()
             ))
-        })?;
-        Forces::new(py, &row, self.rate()?)
+        })
+    }
+
+    /// Returns the forces of a step, or None if the file has no forces of the step.
+    #[pyo3(name = "_forces")]
+    fn forces_if_recorded(
+        &self,
+        py: Python<'_>,
+        #[pyo3(from_py_with = arguments::step)] step: u64,
+    ) -> PyResult<Option<Forces>> {
+        let row = self.read(py, |tape| tape.forces_at(step))?;
+        let rate = self.rate()?;
+        row.map(|row| Forces::new(py, &row, rate)).transpose()
     }
 
     /// Returns a picture of a recorded step as `recorder export --png` draws it, from the top to the bottom: red,

@@ -54,6 +54,12 @@ enum SharedRunning {
 
 impl SharedRunning {
     fn with<R>(&self, call: impl FnOnce(&mut Running) -> PyResult<R>) -> PyResult<R> {
+        let call = |running: &mut Running| {
+            running.is_in_call = true;
+            let result = call(running);
+            running.is_in_call = false;
+            result
+        };
         match self {
             Self::Alone(running) => {
                 let mut running = whole(running, "simulation")?;
@@ -73,6 +79,8 @@ struct Running {
     /// Copy of the particles, once a program has asked for them after the last change.
     particles: Option<Arc<Vec<ParticleState>>>,
     recording: Option<Recorded>,
+    /// A call is under way, or a panic has ended it.
+    is_in_call: bool,
 }
 
 /// The recording of the steps, and its path for errors.
@@ -116,9 +124,11 @@ impl Running {
         result.map(|_| ())
     }
 
-    /// Records the outcome of a command that changes the next step.
+    /// Records the outcome of a command, which changes the next step unless it was rejected.
     fn note(&mut self, action: sim_contract::Action, result: Result<Applied, Reason>) {
-        (self.is_changed, self.particles) = (true, None);
+        if result.is_ok() {
+            (self.is_changed, self.particles) = (true, None);
+        }
         if let Some(recording) = &mut self.recording {
             recording.file.add_command(self.step + 1, action, result);
         }
@@ -151,10 +161,13 @@ impl Running {
 }
 
 impl Drop for Running {
-    /// A recording of a program that does not close it is complete, too.
+    /// Completes the recording of a program that does not close it. After a panic, its last step may be missing, so
+    /// the file keeps its `.part`.
     fn drop(&mut self) {
-        // There is nobody to tell; `close` does.
-        _ = self.finish();
+        if !self.is_in_call {
+            // There is nobody to tell; `close` does.
+            _ = self.finish();
+        }
     }
 }
 
@@ -184,7 +197,14 @@ impl Simulation {
         });
         let recording = recording.transpose()?;
         let scene_hash = scene_hash(scene.to_toml().as_bytes());
-        let running = Running { solver, step: 0, is_changed: false, particles: None, recording };
+        let running = Running {
+            solver,
+            step: 0,
+            is_changed: false,
+            particles: None,
+            recording,
+            is_in_call: false,
+        };
         let running = match (&running.recording, running.solver.threads()) {
             (None, 1) => SharedRunning::Alone(Mutex::new(running)),
             (None, _) => {
@@ -440,6 +460,7 @@ impl Simulation {
     /// The style "wires" shows particles, constraints and triangles, and "shaded" smooth surfaces. `bounds` are two
     /// corners of the box that the picture shows, by default around the state: give them to keep the camera still.
     #[pyo3(signature = (*, size=(960, 720), view=None, style="wires", bounds=None))]
+    #[allow(clippy::too_many_arguments, reason = "these are the keywords of Python")]
     fn render<'py>(
         &self,
         py: Python<'py>,

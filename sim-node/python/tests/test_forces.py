@@ -151,6 +151,24 @@ def test_a_recording_has_the_forces_of_each_step_bit_for_bit(
         recording.forces(STEPS + 1)
 
 
+class UnreadableForces(catenary.Recording):
+    """A recording whose forces cannot be read."""
+
+    def _forces(self, step: int) -> catenary.Forces | None:
+        raise catenary.RecordingError(f"step {step} is damaged")
+
+
+def test_arrays_leave_out_forces_only_where_none_were_recorded(
+    simulate: Callable[..., Path], rope: Path
+) -> None:
+    path = simulate(str(rope), "--steps", "3", "--forces")
+    forces = catenary.Recording(str(path)).to_numpy().forces
+    assert forces is not None
+    assert np.isnan(forces.fixed_impulses[0]).all() and np.isfinite(forces.fixed_impulses[1:]).all()
+    with pytest.raises(catenary.RecordingError, match="step 0 is damaged"):
+        UnreadableForces(str(path)).to_numpy()
+
+
 def test_a_recording_without_forces_names_the_option(simulate: Callable[..., Path]) -> None:
     recording = catenary.open(simulate("rope", "--steps", "20"))
     with pytest.raises(catenary.RecordingError, match="--forces"):

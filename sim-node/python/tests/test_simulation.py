@@ -336,6 +336,9 @@ def test_a_copy_goes_on_with_the_same_bits(make_copy: Callable[[Environment], En
         one.step(100)
     assert second.hash == first.hash
     assert np.array_equal(second.forces().impulses, first.forces().impulses)
+    with pytest.raises(catenary.Rejected):
+        first.pin(1_000_000)
+    assert make_copy(first).hash == first.hash, "a rejected command changes nothing"
     first.pin(1)
     with pytest.raises(catenary.StateError, match="call `step"):
         make_copy(first)

@@ -625,6 +625,8 @@ class Recording:
         Raises `KeyError` for a step before the first or after the last one, and `RecordingError` if the file has no
         forces of the step: it was made without `--forces`, or no step has led to its first state.
         """
+    def _forces(self, step: int) -> Forces | None:
+        """Returns the forces of a step, or None if the file has no forces of the step."""
     def render(
         self,
         step: int,

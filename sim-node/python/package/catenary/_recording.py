@@ -13,7 +13,6 @@ import numpy.typing as npt
 
 from catenary import _catenary
 from catenary._catenary import Forces, Snapshot
-from catenary._errors import RecordingError
 
 
 class Recording(_catenary.Recording):
@@ -185,7 +184,7 @@ class Steps:
             positions=np.empty(shape, np.float32),
             velocities=np.empty(shape, np.float32),
             commands=self._commands(int(steps[0]), int(steps[-1])),
-            forces=_stacked([self._forces(int(step)) for step in steps]),
+            forces=_stacked([self._recording._forces(int(step)) for step in steps]),
         )
         for index, snapshot in enumerate(self):
             arrays.times[index] = snapshot.time
@@ -196,12 +195,6 @@ class Steps:
 
     def _commands(self, first: int, last: int) -> list[dict[str, Any]]:
         return [row for row in self._recording._all_outcomes if first <= row["step"] <= last]
-
-    def _forces(self, step: int) -> Forces | None:
-        try:
-            return self._recording.forces(step)
-        except RecordingError:
-            return None
 
 
 def _stacked(steps: list[Forces | None]) -> ForceArrays | None:

@@ -40,6 +40,7 @@ class Simulation(Commands[None], _catenary.Simulation):
     ) -> None:
         self.close()
 
+    # Before protocol 4, pickle would name the compiled class, which cannot be found under its name.
     def __reduce__(self) -> tuple[Any, ...]:
         _, arguments = self.__getnewargs_ex__()
         return _made, (type(self), arguments), self.__getstate__()
