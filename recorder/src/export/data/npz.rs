@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use std::io::Write;
 
 use anyhow::bail;
-use recorder::{ForcesRow, OutcomeRow, SceneState};
+use recorder::{ForcesRow, OutcomeRow, SceneState, counted};
 use sim_contract::{ParticleState, PlainF32};
 use zip::write::{SimpleFileOptions, StreamWriter};
 use zip::{DateTime, ZipWriter};
@@ -244,7 +244,8 @@ impl Archive<'_> {
             let row_size_bytes = width * NUMBER_SIZE_BYTES;
             if bytes.len() != rows * row_size_bytes {
                 let (step, found) = (state.row.step, bytes.len() / row_size_bytes);
-                bail!("step {step}: {name} has {found} rows, but {rows} in other steps");
+                let found = counted(found as u64, "row");
+                bail!("step {step}: {name} has {found}, but {rows} in other steps");
             }
             Ok(self.0.write_all(&bytes)?)
         })

@@ -101,7 +101,7 @@ fn arrays_of_forces_with_another_number_of_rows_are_refused() {
     };
     written([2, 2]).unwrap();
     let error = written([1, 2]).unwrap_err().to_string();
-    assert_eq!(error, "step 1: anchor_impulses has 1 rows, but 2 in other steps");
+    assert_eq!(error, "step 1: anchor_impulses has 1 row, but 2 in other steps");
 }
 
 #[test]
