@@ -13,7 +13,7 @@ use sim_contract::clock::monotonic_ns;
 use sim_contract::{
     LoadHeader, ParticleState, RestoreContents, SnapshotHeader, Triangle, scene_hash,
 };
-use sim_solver::{Applied, Reason, RestoreError, SOLVER_VERSION, Scene, Solver};
+use sim_solver::{Applied, EnergyMeter, Reason, RestoreError, SOLVER_VERSION, Scene, Solver};
 
 use crate::arguments;
 use crate::convert::{from_json, hash, hash_hex, motion};
@@ -79,6 +79,8 @@ struct Running {
     /// Copy of the particles, once a program has asked for them after the last change.
     particles: Option<Arc<Vec<ParticleState>>>,
     recording: Option<Recorded>,
+    /// Measures the energy, once a program has asked for it.
+    meter: Option<EnergyMeter>,
     /// A call is under way, or a panic has ended it.
     is_in_call: bool,
 }
@@ -203,6 +205,7 @@ impl Simulation {
             is_changed: false,
             particles: None,
             recording,
+            meter: None,
             is_in_call: false,
         };
         let running = match (&running.recording, running.solver.threads()) {
@@ -401,6 +404,17 @@ impl Simulation {
             })
         })?;
         Forces::new(py, &row, self.rate())
+    }
+
+    /// Returns the energy of the current state by kind: `kinetic`, `potential` (-m g.x, with x from the origin of the scene)
+    /// and `elastic`, in J if the scene is in metres, of the free particles and of the constraints and bends that are not torn.
+    fn energy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let energy = self.with(py, |running| {
+            let solver = &running.solver;
+            let meter = running.meter.get_or_insert_with(|| EnergyMeter::of(solver));
+            Ok(meter.measure_solver(solver))
+        })?;
+        from_json(py, &energy)
     }
 
     /// Returns the complete state, which `restore` puts in place again.

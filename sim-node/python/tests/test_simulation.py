@@ -358,6 +358,16 @@ def test_simulations_go_to_other_processes_and_come_back() -> None:
     assert (other.hash, other.step_count) == (simulation.hash, 105)
 
 
+def test_the_energy_of_a_fall_turns_from_potential_to_kinetic() -> None:
+    scene = "version = 1\n[solver]\nsubsteps = 64\n[[particle]]\nposition = [0, 3, 0]\nmass = 2\n"
+    falling = catenary.Simulation(toml=scene)
+    assert falling.energy() == pytest.approx({"kinetic": 0.0, "potential": 2 * 9.81 * 3, "elastic": 0.0})
+    falling.step(falling.rate // 2)
+    fall = 9.81 / 8
+    expected = {"kinetic": 2 * 9.81 * fall, "potential": 2 * 9.81 * (3 - fall), "elastic": 0.0}
+    assert falling.energy() == pytest.approx(expected, rel=1e-3)
+
+
 @pytest.mark.parametrize("forces", [False, True])
 def test_a_recorded_simulation_has_the_bytes_of_recorder_simulate(
     tmp_path: Path, simulate: Callable[..., Path], forces: bool

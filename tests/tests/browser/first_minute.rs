@@ -41,6 +41,32 @@ fn the_page_opens_on_something_that_moves_with_a_hint_until_it_is_touched() {
 
 #[test]
 #[ignore = "needs Chromium"]
+fn a_large_scene_arrives_over_a_slow_line_and_the_page_says_how_far() {
+    // 20,164 particles without a pattern: the bridge compresses what is generated.
+    let mut text = "version = 1\n".to_owned();
+    for index in 0_u32..20_164 {
+        let [x, y, z] = [1, 2, 3].map(|axis| (index * axis).wrapping_mul(2_654_435_761) >> 8);
+        text += &format!("[[particle]]\nposition = [{x}e-7, {y}e-7, {z}e-7]\npinned = true\n");
+    }
+    let rig = Rig::with_scene(&text, &["--paused"], "");
+    // 1 Mbit/s.
+    let page = rig.tab_over_slow_line(125_000);
+    page.evaluate(
+        "window.texts = new Set(); new MutationObserver(() => texts.add(viewer.banner.text)).observe(document.querySelector('#banner'), { childList: true, characterData: true, subtree: true })",
+    );
+    page.wait("viewer.scene === 'scene' && viewer.frame >= 0");
+    let texts = page.evaluate("[...texts]");
+    let shares = texts.as_array().unwrap().iter().filter_map(|text| {
+        let share = text.as_str()?.strip_prefix("Receiving the scene: ")?.strip_suffix(" %.")?;
+        share.parse::<u32>().ok()
+    });
+    let shares: Vec<_> = shares.collect();
+    assert!(shares.len() > 1 && shares.is_sorted(), "{texts}");
+    page.wait("document.querySelector('#banner').hidden");
+}
+
+#[test]
+#[ignore = "needs Chromium"]
 fn every_scene_is_loaded_by_keys_and_from_the_menu_at_its_own_rate() {
     let mut rig = Rig::new(&["drape"], "");
     let catalog = Catalog::default();

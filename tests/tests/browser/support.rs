@@ -5,6 +5,7 @@ mod chromium;
 mod picture;
 mod replay;
 mod rig;
+mod slow_line;
 mod tab;
 
 pub(crate) use camera::{Camera, distance};

@@ -541,6 +541,10 @@ class Simulation:
 
         Raises `Error` for a simulation that was made without `forces=True`.
         """
+    def energy(self) -> dict[str, float]:
+        """Returns the energy of the current state by kind: `kinetic`, `potential` (-m g.x, with x from the origin of the scene)
+        and `elastic`, in J if the scene is in metres, of the free particles and of the constraints and bends that are not torn.
+        """
     def state(self) -> State:
         """Returns the complete state, which `restore` puts in place again.
 
