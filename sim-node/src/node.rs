@@ -300,12 +300,12 @@ impl Node {
         let mut report = |event| events.push(event);
         // A step that was not published has no turns.
         let is_ready = if is_stepping && publisher.has_published(step) {
-            lockstep.wait(publisher, step, monotonic_ns() + WAITING_POLL_NS, report)
+            lockstep.wait(publisher, step, monotonic_ns() + WAITING_POLL_NS, &mut report)
         } else {
             lockstep.receive(publisher, step, &mut report);
-            lockstep.search(publisher, &mut report);
             true
         };
+        lockstep.search(publisher, &mut report);
         for event in &events {
             lockstep.changes.add(event.to_change(step));
             match event {

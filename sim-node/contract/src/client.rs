@@ -15,6 +15,7 @@ pub(crate) mod torn;
 pub(crate) mod views;
 pub(crate) mod watch;
 
+use std::mem;
 use std::time::Duration;
 
 use crate::client::forces::{ForcesReader, Search};
@@ -38,6 +39,7 @@ use crate::ports::service::{
     BENDS, COLLIDERS, PARAMETERS, PARTICLES, SCENE, STATUS, SURFACE, ServiceError, TEARS, TOPOLOGY,
 };
 use crate::ports::services::{AttachError, Attachment};
+use crate::ports::session::Values;
 use sim_types::{Action, CLIENT_ID_END};
 
 /// A program's connection to a simulation: reads snapshots, sends commands.
@@ -61,7 +63,7 @@ pub struct Client {
     parameters: Option<Latch<ParameterState, ParametersHeader>>,
     colliders: Option<Latch<ColliderState, CollidersHeader>>,
     forces: Option<ForcesReader>,
-    status: Option<ValueReader<NodeStatus>>,
+    status: Option<StatusReader>,
     commander: Option<Commander>,
     member: Option<Member>,
     // Dropped last: the ports belong to its services and its node.
@@ -290,8 +292,11 @@ impl Client {
     /// The service has no place for another reader, or `/dev/shm` none for the reader's memory.
     pub fn status(&mut self, timeout: Duration) -> Result<Option<NodeStatus>, ReadError> {
         let service = &self.attachment.status;
-        let reader = get_or_create(&mut self.status, || ValueReader::create(service, &STATUS))?;
-        self.watch.wait_for(&self.attachment, timeout, || reader.newest())
+        let reader = get_or_create(&mut self.status, || StatusReader::create(service))?;
+        self.watch.wait_for(&self.attachment, timeout, || {
+            reader.receive()?;
+            Ok(reader.take_unread())
+        })
     }
 
     /// Sends a command without waiting for its outcome. Returns its sequence number. Only the outcome
@@ -402,7 +407,12 @@ impl Client {
             Ok(reader.newest()?.map(Snapshot).filter(|one| member.takes_part(one.header())))
         })?;
         if let Some(snapshot) = &snapshot {
-            member.begin_turn(snapshot.header());
+            // A status that names a member dropped in its turn precedes the next snapshot.
+            let status = match &mut self.status {
+                Some(reader) => reader.receive()?,
+                None => None,
+            };
+            member.begin_turn(snapshot.header(), status);
         }
         Ok(snapshot)
     }
@@ -449,6 +459,38 @@ impl Drop for Client {
                 Ok((!commander.awaits_outcomes()).then_some(()))
             });
         }
+    }
+}
+
+/// A reader of the status that keeps the newest one.
+#[derive(Debug)]
+struct StatusReader {
+    reader: ValueReader<NodeStatus>,
+    newest: Option<NodeStatus>,
+    is_unread: bool,
+}
+
+impl StatusReader {
+    fn create(service: &Values<NodeStatus>) -> Result<Self, ServiceError> {
+        let reader = ValueReader::create(service, &STATUS)?;
+        Ok(Self { reader, newest: None, is_unread: false })
+    }
+
+    /// Returns the newest status that has arrived, read or not.
+    fn receive(&mut self) -> Result<Option<&NodeStatus>, ReadError> {
+        if let Some(status) = self.reader.newest()? {
+            (self.newest, self.is_unread) = (Some(status), true);
+        }
+        Ok(self.newest.as_ref())
+    }
+
+    fn take_unread(&mut self) -> Option<NodeStatus> {
+        self.newest.filter(|_| mem::take(&mut self.is_unread))
+    }
+
+    /// Lets the newest status be read once more.
+    fn read_again(&mut self) {
+        self.is_unread = true;
     }
 }
 

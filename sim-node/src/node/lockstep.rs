@@ -134,7 +134,12 @@ impl Lockstep {
         report: &mut impl FnMut(Event),
     ) {
         let last = Published { run_id: publisher.run_id(), step };
-        publisher.receive_ready(|message, connection| self.add(message, connection, last, report));
+        publisher.receive_ready(|message, connection| {
+            // A closed connection may have left a message, but it is no member any more.
+            if self.is_member(connection) || publisher.listed_members().contains(&connection) {
+                self.add(message, connection, last, report);
+            }
+        });
     }
 
     fn add(
@@ -162,6 +167,10 @@ impl Lockstep {
         } else {
             self.refused_count += 1;
         }
+    }
+
+    fn is_member(&self, connection: ConnectionId) -> bool {
+        self.members.iter().any(|member| member.connection == connection)
     }
 
     fn is_waiting(&self, step: u64) -> bool {
@@ -207,7 +216,7 @@ impl Lockstep {
         });
     }
 
-    /// Forgets the members that are gone, a few times a second. For a node that does not wait for them.
+    /// Removes the members that are gone, a few times a second, also while the node does not wait for them.
     pub(super) fn search(&mut self, publisher: &Publisher, report: &mut impl FnMut(Event)) {
         let now_ns = monotonic_ns();
         if self.members.is_empty() || now_ns < self.next_search_ns {

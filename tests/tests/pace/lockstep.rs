@@ -92,6 +92,26 @@ fn a_client_that_has_read_the_newest_snapshot_joins_and_takes_its_turn_at_it() {
 }
 
 #[test]
+fn a_client_that_leaves_and_joins_again_at_once_is_waited_for() {
+    let sandbox = Sandbox::new();
+    let args = ["run", "curtain", "--as-fast-as-possible"];
+    let _node = Process::start_ready(Program::SimNode, &sandbox, &args);
+    let mut client = Client::attach_as(&sandbox.endpoint(), 7).unwrap();
+    for round in 0..50 {
+        // The next turn of some members is far ahead when they leave.
+        let every = NonZeroU32::new(if round % 2 == 0 { 1 } else { 1_000_000 }).unwrap();
+        client.join_lockstep_every(every, DEADLINE).unwrap();
+        let step = client.next_turn(DEADLINE).unwrap().unwrap().header().step;
+        client.send(Action::Pin { particle: 30 }).unwrap();
+        client.ready().unwrap();
+        let outcome = client.next_outcome(DEADLINE).unwrap().unwrap();
+        assert_eq!(outcome.step, step + 1, "round {round}");
+        assert_eq!(client.missed_turns(), 0);
+        client.leave_lockstep();
+    }
+}
+
+#[test]
 fn a_resumed_node_waits_for_its_members_before_the_first_step() {
     let sandbox = Sandbox::new();
     let args = ["run", "curtain", "--paused", "--as-fast-as-possible"];
@@ -256,8 +276,27 @@ fn a_member_that_is_too_late_sees_how_many_turns_it_has_missed() {
     client.ready().unwrap();
     let next = turn(&mut client);
     // Each second step is published, so the member, which takes part in every third, has each fourth.
-    assert_eq!(client.missed_turns(), (next - last - 4).div_ceil(4));
+    // The turn at `last` is one of those that the node did not wait for.
+    assert_eq!(client.missed_turns(), 1 + (next - last - 4).div_ceil(4));
     assert!(next > last + 60, "{next} after {last}");
+}
+
+#[test]
+fn a_member_that_is_too_late_but_in_time_for_its_next_turn_has_missed_one() {
+    let sandbox = Sandbox::new();
+    let args = ["run", "curtain", "--lockstep-timeout", "100ms", "--rate", "240"];
+    let _node = Process::start_ready(Program::SimNode, &sandbox, &args);
+    let mut client = Client::attach(&sandbox.endpoint()).unwrap();
+    client.join_lockstep_every(NonZeroU32::new(480).unwrap(), DEADLINE).unwrap();
+    let step = client.next_turn(DEADLINE).unwrap().unwrap().header().step;
+    wait_for("a step without the member", || {
+        (ctl(&sandbox, &["hash"])["step"].as_u64().unwrap() > step).then_some(())
+    });
+    // A program that reads the status itself hides nothing.
+    client.status(DEADLINE).unwrap().unwrap();
+    client.ready().unwrap();
+    assert_eq!(client.next_turn(DEADLINE).unwrap().unwrap().header().step, step + 480);
+    assert_eq!(client.missed_turns(), 1);
 }
 
 #[test]

@@ -43,22 +43,27 @@ impl Client {
         joined
     }
 
-    /// Asks to join the lockstep like [`Client::join_lockstep_every`], without waiting for the answer.
+    /// Begins to join the lockstep like [`Client::join_lockstep_every`], without waiting:
+    /// [`Client::await_membership`] completes it.
     ///
     /// # Errors
     /// The lockstep already has [`crate::MEMBERS_MAX`] members, or `/dev/shm` is full.
     pub fn request_membership(&mut self, every: NonZeroU32) -> Result<(), LockstepError> {
         // The node may wait at a snapshot that this client has read: a new reader receives it again.
         self.particles = None;
-        let member = Member::create(&self.attachment, self.id, every)?;
-        member.join()?;
-        self.member = Some(member);
+        if let Some(status) = &mut self.status {
+            status.read_again();
+        }
+        self.member = Some(Member::create(&self.attachment, self.id, every)?);
         Ok(())
     }
 
-    /// Waits until the node has admitted this client. After a timeout, it can be called again: a program
-    /// that must react to something else waits in short parts. A client that gives up calls
+    /// Asks the node for the membership, and waits until it has admitted this client. After a timeout, it can be
+    /// called again: a program that must react to something else waits in short parts. A client that gives up calls
     /// [`Client::leave_lockstep`], or the node waits for a client that does not know of its membership.
+    ///
+    /// The status names members by their client ids, so the client asks only when no member has its id: an earlier
+    /// membership of this id has ended then.
     ///
     /// # Errors
     /// [`LockstepError::NotAdmitted`] after `timeout`, or the client has not asked to join.
@@ -66,14 +71,15 @@ impl Client {
         let deadline = Deadline::after(timeout);
         while let Some(status) = self.status(deadline.remaining())? {
             let member = self.member.as_mut().ok_or(LockstepError::NotJoined)?;
-            let admission = status.members().iter().find(|one| one.client_id == self.id);
-            if let Some(admission) = admission {
-                member.admit(status.run_id, admission.step);
-                return Ok(());
+            match status.members().iter().find(|one| one.client_id == self.id) {
+                Some(admission) if member.has_asked() => {
+                    member.admit(status.run_id, admission.step);
+                    return Ok(());
+                }
+                Some(_) => {}
+                // Asks again, too: a node that waits only briefly may have dropped this client already.
+                None => member.join()?,
             }
-            // A node that waits only briefly may have dropped this client before it knew of its
-            // membership.
-            member.join()?;
         }
         Err(LockstepError::not_admitted(&self.attachment, timeout))
     }

@@ -128,7 +128,7 @@ impl Tap {
     /// Same as [`Tap::attach`], or the lockstep has no place for another member.
     pub fn attach_in_lockstep(endpoint: &Endpoint) -> Result<Self, LockstepError> {
         let attachment = Attachment::to(endpoint)?;
-        let member = Member::create(&attachment, random_client_id()?, Self::LOCKSTEP_EVERY)?;
+        let mut member = Member::create(&attachment, random_client_id()?, Self::LOCKSTEP_EVERY)?;
         member.join()?;
         Ok(Self::subscribe(attachment, Some(member))?)
     }
@@ -284,7 +284,7 @@ impl Tap {
         if let Some(member) = &mut self.member
             && member.takes_part(held.header())
         {
-            member.begin_turn(held.header());
+            member.begin_turn(held.header(), None);
         }
         self.assembler.assemble(held.header(), held.particles())
     }
