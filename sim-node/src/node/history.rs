@@ -11,9 +11,10 @@ use sim_solver::{Blocks, Chain, Keyframe, Particle, Solver};
 /// forgotten, and steps back across them are counted as if they did not exist.
 const BRANCHES_MAX: usize = 4096;
 
-/// Part of the memory that the list of the states takes: with more of them, small scenes would have longer lists
-/// than states.
+/// The list of the states takes at least one part in so many of the memory, for smaller scenes that a load brings.
 const LIST_PART: usize = 16;
+/// Fewest particles for which a state takes memory.
+const PARTICLES_MIN: usize = 8;
 /// Memory in the list for a state, and for a keyframe that it does not share.
 const ENTRY_SIZE_BYTES: usize = size_of::<KeptState>() + size_of::<(usize, usize, KeptKeyframe)>();
 
@@ -78,13 +79,14 @@ impl History {
     /// There is not enough memory.
     pub(super) fn new(limit_bytes: usize, solver: &Solver) -> anyhow::Result<Self> {
         const PROBLEM: &str = "no memory for --history";
-        let count_max = limit_bytes / LIST_PART / ENTRY_SIZE_BYTES;
+        let count_max = longest_list(limit_bytes, solver.particle_count());
         let mut states = VecDeque::new();
         states.try_reserve_exact(count_max).context(PROBLEM)?;
         let mut history = Self {
             states,
             count_max,
-            blocks: Blocks::new(limit_bytes - count_max * ENTRY_SIZE_BYTES).context(PROBLEM)?,
+            blocks: Blocks::new(limit_bytes.saturating_sub(count_max * ENTRY_SIZE_BYTES))
+                .context(PROBLEM)?,
             branches: VecDeque::with_capacity(BRANCHES_MAX),
             newest: None,
         };
@@ -255,6 +257,14 @@ impl History {
     }
 }
 
+/// Returns the most states that fit into the memory beside their entries in the list: at least one, if there is any
+/// memory.
+fn longest_list(limit_bytes: usize, particle_count: usize) -> usize {
+    let state_size_bytes = particle_count.max(PARTICLES_MIN) * size_of::<Particle>();
+    let count = limit_bytes / (ENTRY_SIZE_BYTES + state_size_bytes);
+    count.max(limit_bytes / LIST_PART / ENTRY_SIZE_BYTES).max(limit_bytes.min(1))
+}
+
 #[cfg(test)]
 mod tests {
     //! Checks which states are kept, and that each is the one of its step.
@@ -275,11 +285,16 @@ mod tests {
         history.states.iter().map(|state| state.step).collect()
     }
 
+    /// Memory for `count` states and one keyframe.
+    fn limit_bytes(count: usize, solver: &Solver) -> usize {
+        let state = ENTRY_SIZE_BYTES + solver.particle_count().max(8) * size_of::<Particle>() + 4;
+        count * state + if count == 0 { 0 } else { solver.keyframe().encode().len() + 500 }
+    }
+
     /// A history with room for about `count` states, after the steps up to `last`.
     fn history_after(count: usize, last: u64) -> History {
         let mut solver = pendulum();
-        // A list with room for `count` states. The blocks beside it hold more.
-        let mut history = History::new(count * LIST_PART * ENTRY_SIZE_BYTES, &solver).unwrap();
+        let mut history = History::new(limit_bytes(count, &solver), &solver).unwrap();
         history.keep(0, &solver, false);
         for step in 1..=last {
             solver.step();
@@ -313,8 +328,32 @@ mod tests {
         let history = history_after(0, 7);
         assert!(steps(&history).is_empty());
         assert!(history.has_room(&pendulum()), "none is asked for");
-        let too_small = History::new(LIST_PART * ENTRY_SIZE_BYTES, &cloth()).unwrap();
-        assert!(!too_small.has_room(&cloth()));
+    }
+
+    #[test]
+    fn a_memory_that_is_too_small_for_a_state_is_not_none() {
+        for limit_bytes in [1, 300, 1300, 5000] {
+            let mut history = History::new(limit_bytes, &cloth()).unwrap();
+            assert!(!history.has_room(&cloth()), "{limit_bytes}");
+            history.keep(0, &cloth(), false);
+            let target = Target { to_step: Some(0), back_steps: None };
+            assert_eq!(history.find(0, target).unwrap_err(), Reason::UnknownStep);
+        }
+    }
+
+    #[test]
+    fn states_of_any_size_fill_the_memory() {
+        for (mut solver, limit_bytes) in [(pendulum(), 1 << 17), (cloth(), 1 << 21)] {
+            let mut history = History::new(limit_bytes, &solver).unwrap();
+            let all = history.blocks.free_count();
+            let mut fewest_free = all;
+            for step in 0..1000 {
+                history.keep(step, &solver, false);
+                fewest_free = fewest_free.min(history.blocks.free_count());
+                solver.step();
+            }
+            assert!(fewest_free * 10 < all, "{fewest_free} of {all} blocks were never used");
+        }
     }
 
     #[test]
