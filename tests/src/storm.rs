@@ -7,7 +7,7 @@ use fastrand::Rng;
 use recorder::{FrameReader, LogReader};
 use sim_contract::{
     Action, Client, ELEMENTS_MAX, Endpoint, GivenState, MovedObject, Outcome, ParameterValue,
-    ParticleState, PathPoint, Reason, RestoreContents, Text, scene_hash,
+    ParticleState, PathPart, PathPoint, Reason, RestoreContents, Text, scene_hash,
 };
 
 use crate::process::{Process, ctl, record};
@@ -205,7 +205,9 @@ fn action(held: &HeldState, rng: &mut Rng) -> Action {
         12 => {
             let point = |time| PathPoint { time, translation, rotation };
             let points = [point(0.1), point(0.3 + rng.f64())];
-            Action::follow(MovedObject::Collider, 0, &points, rng.bool()).swap_remove(0)
+            let path = PathPart::new(&points).unwrap_or(PathPart::EMPTY);
+            let object = MovedObject::Collider;
+            Action::Follow { object, object_index: 0, path, append: rng.bool() }
         }
         _ => Action::Grab { particle, target, over_s: rng.f32() * 0.5 },
     }

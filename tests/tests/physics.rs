@@ -2,7 +2,10 @@
 //! snapshots show its effect, late subscribers see it, and a recording of it re-simulates bit for bit.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
+use std::fs;
+
 use integration_tests::{DEADLINE, Process, Program, Sandbox, ctl, record};
+use serde_json::Value;
 use sim_contract::{Action, Client, ColliderShape, ParticleFlags, Reason, TearCause, Text};
 
 /// A small cloth in the wind on an anchor, over a floor and beside a ball.
@@ -158,6 +161,20 @@ fn refused_commands_change_no_bit() {
         ctl(&sandbox, &["hash"])["state_hash"].clone()
     };
     assert_eq!(run(REFUSED), run(&[]));
+}
+
+#[test]
+fn a_path_whose_first_command_is_refused_appends_nothing_to_the_motion_under_way() {
+    let sandbox = Sandbox::new();
+    let _node = node(&sandbox, &["--paused"]);
+    ctl(&sandbox, &["move-collider", "1", "1", "0", "0", "--over", "1s"]);
+    let path = sandbox.path("path.csv");
+    let point = |index| format!("{} {} 0 0\n", 10 + index, if index == 0 { "2e7" } else { "0" });
+    fs::write(&path, (0..12).map(point).collect::<String>()).unwrap();
+    let outcome = ctl(&sandbox, &["follow", "collider", "1", "--path", &path]);
+    assert_eq!((&outcome["reason"], &outcome["append"]), (&"out_of_range".into(), &Value::Null));
+    let status = attach(&sandbox).status(DEADLINE).unwrap().unwrap();
+    assert_eq!((status.outcome_count, status.rejected_count), (2, 1));
 }
 
 #[test]

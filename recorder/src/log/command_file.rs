@@ -157,7 +157,9 @@ fn actions(fields: &Map<String, Value>) -> Result<Vec<Action>, FieldError> {
         (Action::Follow { object, object_index, append, .. }, Some(Value::Array(points)))
             if !points.is_empty() =>
         {
-            Ok(Action::follow(object, object_index, &path_points(points)?, append))
+            Action::follow(object, object_index, &path_points(points)?, append).map_err(|error| {
+                invalid("path", &error.to_string(), allowed_values("follow", "path"))
+            })
         }
         (action, _) => Ok(vec![action]),
     }
@@ -338,6 +340,9 @@ mod tests {
             })
             .collect();
         assert_eq!(parts, [(5, 4, false), (5, 4, true), (5, 1, true)]);
+        let wrong = line.replace(r#""time":9"#, r#""time":8"#);
+        let error = parse_commands(&wrong, "x").unwrap_err().to_string();
+        assert!(error.contains("point 8 of the path: the time 8 is not after 8"), "{error}");
     }
 
     #[test]

@@ -178,6 +178,29 @@ def test_many_commands_are_sent_before_the_first_answer(start_node: StartNode) -
     assert sequences == sorted(sequences)
 
 
+def test_a_path_whose_first_command_is_refused_appends_nothing_to_the_motion_under_way(
+    start_node: StartNode,
+) -> None:
+    node = start_node("drop-box", "--paused")
+    first = node.move_collider(0, (1, 0, 0), over=1.0)
+    path = [(index + 10, 2e7 if index == 0 else 0, 0, 0) for index in range(12)]
+    with pytest.raises(catenary.Rejected, match="out_of_range"):
+        node.follow("collider", 0, path)
+    assert node.mark("end").index == first.index + 2
+
+
+def test_a_wrong_path_names_its_point() -> None:
+    for path, fault in [
+        ([], r"a path of 0 points \(allowed: 1 to 2048\)"),
+        ([[0, 0, 0, 0], [1, 0, 0]], r"point 1 of the path: 3 numbers \(allowed: 4,"),
+        ([[0, 0, 0, 0], [0, 0, 0, 0]], "point 1 of the path: the time 0 is not after 0"),
+        ([[3601, 0, 0, 0]], "point 0 of the path: the time 3601 is out of range"),
+        ([[0, 0, float("nan"), 0]], "point 0 of the path: a number is not finite"),
+    ]:
+        with pytest.raises(ValueError, match=fault):
+            catenary.Action.follow("collider", 0, path)
+
+
 def test_a_scene_that_cannot_be_loaded_is_refused_with_its_cause(
     start_node: StartNode, tmp_path: Path
 ) -> None:

@@ -7,8 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::frame::{Frame, Pose};
 use crate::scene::definition::anchor::Waypoint;
 
-/// Most points of all motions of a scene that are on their way. A keyframe has room for as many.
-pub const MOTION_POINTS_MAX: usize = 2048;
+pub use sim_types::MOTION_POINTS_MAX;
 
 /// Times that differ from whole steps by less than this, in steps, are those steps: 0.1 s at 240 Hz is 24 steps.
 const STEP_ROUNDING: f64 = 1e-6;

@@ -411,7 +411,7 @@ fn the_largest_keyframe_of_a_scene_fits_into_the_announced_size() {
         };
         let points: Vec<_> = (1..u32::try_from(MOTION_POINTS_MAX).unwrap()).map(point).collect();
         let particle = sim_types::MovedObject::Particle;
-        for action in sim_types::Action::follow(particle, 0, &points, false) {
+        for action in sim_types::Action::follow(particle, 0, &points, false).unwrap() {
             solver.apply(7, &action).unwrap();
         }
         solver.finish_boundary();

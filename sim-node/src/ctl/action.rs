@@ -4,10 +4,9 @@ use std::fs;
 use std::path::{self, Path};
 use std::time::Duration;
 
-use anyhow::{Context, bail};
+use anyhow::{Context, anyhow};
 use sim_contract::clock::SECOND_NS;
-use sim_contract::{Action, KindFilter, OVER_S_MAX, PathPoint, Text};
-use sim_solver::MOTION_POINTS_MAX;
+use sim_contract::{Action, KindFilter, PathError, PathPoint, Text};
 
 use crate::args::{CommandVerb, FollowArgs, PoseArgs, RewindArgs, SetArgs};
 use crate::scene_source;
@@ -83,46 +82,43 @@ pub(super) fn from_verb(
             },
         },
         CommandVerb::Follow(FollowArgs { object, index, path, append }) => {
-            return Ok(Action::follow(*object, *index, &points(path)?, *append));
+            let rows = rows(path)?;
+            let points: Vec<_> = rows.iter().map(|row| row.point).collect();
+            return Action::follow(*object, *index, &points, *append).map_err(
+                |error| match error {
+                    PathError::Point { index, fault } => {
+                        anyhow!("{}:{}: {fault}", path.display(), rows[index].line)
+                    }
+                    PathError::Length { .. } => anyhow!("{}: {error}", path.display()),
+                },
+            );
         }
     }])
 }
 
-/// Reads the points of a path, one on each line. Checks them first, because a path of several commands should not begin if
-/// one of them is wrong.
-fn points(path: &Path) -> anyhow::Result<Vec<PathPoint>> {
+/// A point in a file.
+struct Row {
+    line: usize,
+    point: PathPoint,
+}
+
+/// Reads the points of a path, one on each line.
+fn rows(path: &Path) -> anyhow::Result<Vec<Row>> {
     let text = fs::read_to_string(path).with_context(|| format!("{}", path.display()))?;
-    let mut points: Vec<PathPoint> = Vec::new();
-    for (line, text) in (1..).zip(text.lines().map(str::trim)) {
-        if text.is_empty() || text.starts_with('#') {
-            continue;
-        }
-        let place = || format!("{}:{line}", path.display());
-        let words = text.split([',', ' ', '\t']).filter(|word| !word.is_empty());
-        let row = words.map(|word| {
-            let number = word.parse::<f64>().ok().filter(|number| number.is_finite());
-            number.with_context(|| format!("'{word}' is not a number"))
-        });
-        let row = row.collect::<anyhow::Result<Vec<_>>>().with_context(place)?;
-        let point = PathPoint::from_row(&row).with_context(place)?;
-        if let Some(before) = points.last().filter(|before| before.time >= point.time) {
-            let problem = format!("{} is not after {}", point.time, before.time);
-            bail!("{}: time: {problem} (allowed: ascending times)", place());
-        }
-        if !(0.0..=f64::from(OVER_S_MAX)).contains(&point.time) {
-            bail!(
-                "{}: time: {} is out of range (allowed: 0 to {OVER_S_MAX} s)",
-                place(),
-                point.time
-            );
-        }
-        points.push(point);
-    }
-    if points.is_empty() || points.len() > MOTION_POINTS_MAX {
-        let count = points.len();
-        bail!("{}: has {count} points (allowed: 1 to {MOTION_POINTS_MAX})", path.display());
-    }
-    Ok(points)
+    let lines = (1..).zip(text.lines().map(str::trim));
+    let lines = lines.filter(|(_, text)| !text.is_empty() && !text.starts_with('#'));
+    let row = |(line, text): (usize, &str)| {
+        let point = point(text).with_context(|| format!("{}:{line}", path.display()))?;
+        Ok(Row { line, point })
+    };
+    lines.map(row).collect()
+}
+
+fn point(line: &str) -> anyhow::Result<PathPoint> {
+    let words = line.split([',', ' ', '\t']).filter(|word| !word.is_empty());
+    let numbers =
+        words.map(|word| word.parse().with_context(|| format!("'{word}' is not a number")));
+    Ok(PathPoint::from_row(&numbers.collect::<anyhow::Result<Vec<_>>>()?)?)
 }
 
 /// Number of steps in a simulated time, rounded up.
@@ -170,7 +166,7 @@ fn setting(args: &SetArgs) -> anyhow::Result<Action> {
 
 #[cfg(test)]
 mod tests {
-    use sim_contract::{ConstraintKind, ParameterValue};
+    use sim_contract::{ConstraintKind, MovedObject, ParameterValue};
 
     use super::*;
     use crate::args::{CtlVerb, Verb, try_parse};
@@ -249,19 +245,22 @@ mod tests {
         let file = std::env::temp_dir().join(format!("catenary-path-{}.csv", std::process::id()));
         let read = |text: &str| {
             fs::write(&file, text).unwrap();
-            points(&file)
+            let path = file.clone();
+            let args = FollowArgs { object: MovedObject::Collider, index: 0, path, append: false };
+            from_verb(&CommandVerb::Follow(args), || Ok(240))
         };
-        let read_points = read("# time x y z\n0, 1, 2, 3\n\n0.5 1 2 3 0 0 0.6 0.8\n").unwrap();
+        let actions = read("# time x y z\n0, 1, 2, 3\n\n0.5 1 2 3 0 0 0.6 0.8\n").unwrap();
         let first = PathPoint { translation: [1.0, 2.0, 3.0], ..PathPoint::AT_LOAD };
         let second = PathPoint { time: 0.5, rotation: [0.0, 0.0, 0.6, 0.8], ..first };
-        assert_eq!(read_points, [first, second]);
+        let object = MovedObject::Collider;
+        assert_eq!(actions, Action::follow(object, 0, &[first, second], false).unwrap());
         for (text, expected) in [
-            ("0 1 2 3\n0 1 2 3", "csv:2: time: 0 is not after 0 (allowed: ascending times)"),
-            ("1 1 2", "csv:1: a point of 3 numbers (allowed: 4, its time in s and x, y, z; or 8,"),
+            ("0 1 2 3\n\n0 1 2 3", "csv:3: the time 0 is not after 0 (allowed: ascending times)"),
+            ("1 1 2", "csv:1: 3 numbers (allowed: 4, its time in s and x, y, z; or 8,"),
             ("1 1 2 x", "csv:1: 'x' is not a number"),
-            ("1 1 2 nan", "csv:1: 'nan' is not a number"),
-            ("3601 1 2 3", "csv:1: time: 3601 is out of range (allowed: 0 to 3600 s)"),
-            ("# nothing", "csv: has 0 points (allowed: 1 to 2048)"),
+            ("1 1 2 nan", "csv:1: a number is not finite"),
+            ("3601 1 2 3", "csv:1: the time 3601 is out of range (allowed: 0 to 3600 s)"),
+            ("# nothing", "csv: a path of 0 points (allowed: 1 to 2048)"),
         ] {
             let error = format!("{:#}", read(text).unwrap_err());
             assert!(error.contains(expected), "{error}");

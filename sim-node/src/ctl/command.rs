@@ -82,24 +82,27 @@ pub(super) fn send(
     Ok(Exit::Done)
 }
 
-/// Sends commands, several at a time, because the outcome of each takes a step. Returns the first outcome that is a
-/// rejection, or the last one.
+/// Sends the first command, and if it is applied the others, which append to its motion: several at a time, because the
+/// outcome of each takes a step. Returns the first outcome that is a rejection, or the last one.
 fn request_all(client: &mut Client, args: &CtlArgs, actions: &[Action]) -> anyhow::Result<Outcome> {
-    let mut last = None;
-    for actions in actions.chunks(COMMANDS_BUFFERED / 2) {
+    let (first, others) = actions.split_first().context("there is nothing to send")?;
+    let mut last = client.request(*first, args.timeout())?;
+    if !last.is_applied() {
+        return Ok(last);
+    }
+    for actions in others.chunks(COMMANDS_BUFFERED / 2) {
         let mut sent = Vec::with_capacity(actions.len());
         for action in actions {
             sent.push(client.send(*action)?);
         }
         for sequence in sent {
-            let outcome = client.outcome(sequence, args.timeout())?;
-            if !outcome.is_applied() {
-                return Ok(outcome);
+            last = client.outcome(sequence, args.timeout())?;
+            if !last.is_applied() {
+                return Ok(last);
             }
-            last = Some(outcome);
         }
     }
-    last.context("there is nothing to send")
+    Ok(last)
 }
 
 /// Time between two checks whether a replay has ended.

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use crate::json::hash;
 use crate::json::non_finite::{number, optional_number, rotation, vector};
 use crate::parameter::ParameterValue;
-use crate::path_part::{PathPart, PathPoint};
+use crate::path_part::{PathError, PathPart, PathPoint, check_path};
 use crate::text::Text;
 
 pub use fields::ActionFields;
@@ -325,12 +325,17 @@ impl RestoreContents {
 impl Action {
     /// The commands that lead an object along points: the first one begins the motion, unless it is to be appended, and
     /// the others append to it.
+    ///
+    /// # Errors
+    /// There are no points or more than [`crate::MOTION_POINTS_MAX`], a number is not finite, or the times do not ascend
+    /// from 0 to [`OVER_S_MAX`].
     pub fn follow(
         object: MovedObject,
         object_index: u32,
         points: &[PathPoint],
         append: bool,
-    ) -> Vec<Self> {
+    ) -> Result<Vec<Self>, PathError> {
+        check_path(points)?;
         let parts = points.chunks(PathPart::POINTS_MAX).filter_map(PathPart::new).enumerate();
         let part = |(index, path)| Self::Follow {
             object,
@@ -338,7 +343,7 @@ impl Action {
             path,
             append: append || index > 0,
         };
-        parts.map(part).collect()
+        Ok(parts.map(part).collect())
     }
 
     /// Samples for tests of formats: one action of each kind, or several if it has options.

@@ -39,12 +39,15 @@ pub use collider_shape::{ColliderFields, ColliderShape};
 pub use constraint_kind::ConstraintKind;
 pub use json::hash as json_hash;
 pub use json::non_finite::PlainF32;
-pub use limits::{CLIENT_ID_END, COLLIDERS_MAX, ELEMENTS_MAX, SCENE_SIZE_BYTES_MAX, STEP_WORK_MAX};
+pub use limits::{
+    CLIENT_ID_END, COLLIDERS_MAX, ELEMENTS_MAX, MOTION_POINTS_MAX, SCENE_SIZE_BYTES_MAX,
+    STEP_WORK_MAX,
+};
 pub use method::Method;
 pub use parameter::{OffMeaning, PARAMETERS, Parameter, ParameterInfo, ParameterValue, ValueForm};
 pub use parameter_values::{BlockValue, ParameterValues, PerKind, SETTINGS_COUNT, Setting};
 pub use particle_flags::ParticleFlags;
-pub use path_part::{PathPart, PathPoint, PathRowError};
+pub use path_part::{PathError, PathPart, PathPoint, PointFault};
 pub use range::{COORDINATE_MAX, NumberRange, allowed_indices};
 pub use reason::Reason;
 pub use suggestion::{did_you_mean, nearest};

@@ -29,11 +29,12 @@ class Node(Commands[Outcome], _catenary.Node):
         return self.request(action)
 
     def _perform_all(self, actions: list[Action]) -> Outcome:
-        """Performs the actions of a command that takes several, such as those of a long path, in one batch."""
+        """Performs the first action of a command that takes several, such as a long path, then the others in a batch."""
+        outcome = self._perform(actions[0])
         if len(actions) == 1:
-            return self._perform(actions[0])
+            return outcome
         with self.batch() as batch:
-            for action in actions:
+            for action in actions[1:]:
                 batch._perform(action)
         return batch.outcomes[-1]
 

@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use sim_contract::{
-    ConstraintKind, GRAB_OVER_S_DEFAULT, KindFilter, MovedObject, PathPoint, Text, read_scene_file,
+    ConstraintKind, GRAB_OVER_S_DEFAULT, KindFilter, MovedObject, PathError, PathPoint, Text, read_scene_file,
 };
 use sim_solver::scene::is_path;
-use sim_solver::{MOTION_POINTS_MAX, Scene};
+use sim_solver::Scene;
 
 use crate::arguments;
 use crate::convert::{Quaternion, Vector, from_json, parameter_value};
@@ -145,16 +145,13 @@ impl Action {
                 return Err(PyValueError::new_err(problem));
             }
         };
-        let points = path.iter().map(|row| PathPoint::from_row(row));
-        let points: Vec<_> = points
-            .collect::<Result<_, _>>()
+        let point = |(index, row): (usize, &Vec<f64>)| {
+            PathPoint::from_row(row).map_err(|fault| PathError::Point { index, fault })
+        };
+        let points: Result<Vec<_>, _> = path.iter().enumerate().map(point).collect();
+        let actions = points
+            .and_then(|points| sim_contract::Action::follow(object, index, &points, append))
             .map_err(|error| PyValueError::new_err(error.to_string()))?;
-        if points.is_empty() || points.len() > MOTION_POINTS_MAX {
-            let count = points.len();
-            let problem = format!("a path of {count} points (allowed: 1 to {MOTION_POINTS_MAX})");
-            return Err(PyValueError::new_err(problem));
-        }
-        let actions = sim_contract::Action::follow(object, index, &points, append);
         Ok(actions.into_iter().map(Self).collect())
     }
 

@@ -3,7 +3,7 @@
 use sim_solver::{
     Action, Grab, Keyframe, MOTION_POINTS_MAX, OVER_S_MAX, Particle, Pose, Reason, Scene, Solver,
 };
-use sim_types::{MovedObject, PathPoint};
+use sim_types::{MovedObject, PathPart, PathPoint};
 
 use super::{assert_close, assert_near, bits, position, solver, step, velocity};
 
@@ -44,7 +44,11 @@ fn follow_as(
     index: u32,
     (points, append): (&[PathPoint], bool),
 ) -> Result<(), Reason> {
-    let actions = Action::follow(object, index, points, append);
+    let actions = match PathPart::new(points) {
+        // Also a wrong path, which `Action::follow` refuses.
+        Some(path) => vec![Action::Follow { object, object_index: index, path, append }],
+        None => Action::follow(object, index, points, append).unwrap(),
+    };
     actions.iter().try_for_each(|action| solver.apply(7, action).map(|_| ()))
 }
 
@@ -237,7 +241,7 @@ fn wrong_motions_are_refused_and_change_nothing() {
     ] {
         assert_eq!(follow(&mut moving, object, index, points), Err(reason), "{points:?}");
     }
-    let action = Action::follow(particle, 0, &many, false)[0];
+    let action = Action::follow(particle, 0, &many, false).unwrap()[0];
     assert_eq!(moving.apply(8, &action), Err(Reason::GrabbedByOther));
     assert_eq!(moving.move_collider_over(0, pose(0.0), 3601.0), Err(Reason::OutOfRange));
     assert_eq!(moving.move_anchor_over(0, pose(0.0), f32::NAN), Err(Reason::NonFinite));
