@@ -27,7 +27,7 @@ use inbox::Inbox;
 use job::Job;
 use job::scene::Overrides;
 use job::work::Work;
-use lockstep::{Event, Lockstep};
+use lockstep::{Event, Lockstep, Published};
 use pace::Pace;
 use pace::polling::Polling;
 use progress::Progress;
@@ -302,7 +302,7 @@ impl Node {
         let is_ready = if is_stepping && publisher.has_published(step) {
             lockstep.wait(publisher, step, monotonic_ns() + WAITING_POLL_NS, &mut report)
         } else {
-            lockstep.receive(publisher, step, &mut report);
+            lockstep.receive(publisher, Published::new(publisher, step), &mut report);
             true
         };
         lockstep.search(publisher, &mut report);
@@ -346,9 +346,6 @@ impl Node {
             ));
         }
         self.step += 1;
-        if self.progress.is_state_due {
-            self.lockstep.begin_state(self.step);
-        }
         self.progress.count_step();
         if !self.progress.is_stepping() {
             // A fresh status follows, so that `ctl status` shows the steps.
@@ -430,7 +427,9 @@ impl Node {
         let mut status = publisher.status(scene, solver, self.position(), statistics);
         status.rejected_count += lockstep.refused_count;
         status.member_changes = lockstep.changes;
-        for (entry, member) in status.members.iter_mut().zip(lockstep.members(self.step)) {
+        for (entry, member) in
+            status.members.iter_mut().zip(lockstep.members(Published::new(publisher, self.step)))
+        {
             *entry = member;
             status.member_count += 1;
         }
@@ -447,7 +446,6 @@ impl Node {
     fn position(&self) -> Position {
         let is_last = self.is_done() || !self.progress.is_stepping();
         let Progress { is_paused, time_scale, .. } = self.progress;
-        let is_in_place = self.lockstep.has_begun_at(self.step);
-        Position { step: self.step, is_paused, is_in_place, time_scale, is_last }
+        Position { step: self.step, is_paused, time_scale, is_last }
     }
 }

@@ -193,7 +193,7 @@ impl Node {
     fn show_state_in_place(&mut self) {
         self.progress.is_state_due = true;
         self.boundary = Boundary::Closed;
-        self.publisher.include(self.step + 1);
+        self.publisher.show_in_place(self.step + 1);
     }
 
     /// Releases a particle whose client is gone. A frozen particle has nothing to release, and no

@@ -29,8 +29,6 @@ pub(super) struct Lockstep {
     members: Vec<Member>,
     /// Longest wait for a member.
     timeout: Duration,
-    /// The newest step whose state a command has put in place, where every member has a turn.
-    begun: u64,
     /// Since when the node waits for the members; `None` if it does not.
     waiting_since_ns: Option<u64>,
     next_search_ns: u64,
@@ -52,18 +50,25 @@ struct Member {
 }
 
 impl Member {
-    /// `begun` is the newest step whose state a command has put in place.
-    fn is_awaited(&self, step: u64, begun: u64) -> bool {
-        let is_begun = step == begun;
-        self.ready.is_none_or(|ready| (is_begun && ready < step) || step >= ready + self.every)
+    fn is_awaited(&self, last: Published) -> bool {
+        let Published { step, is_in_place, .. } = last;
+        self.ready.is_none_or(|ready| (is_in_place && ready < step) || step >= ready + self.every)
     }
 }
 
 /// The last published step.
 #[derive(Debug, Clone, Copy)]
-struct Published {
+pub(super) struct Published {
     run_id: u64,
     step: u64,
+    /// A command has put its state in place, so that every member has a turn.
+    is_in_place: bool,
+}
+
+impl Published {
+    pub(super) fn new(publisher: &Publisher, step: u64) -> Self {
+        Self { run_id: publisher.run_id(), step, is_in_place: publisher.is_in_place(step) }
+    }
 }
 
 impl Lockstep {
@@ -71,7 +76,6 @@ impl Lockstep {
         Self {
             members: Vec::new(),
             timeout,
-            begun: 0,
             waiting_since_ns: None,
             next_search_ns: 0,
             changes: MemberChanges::default(),
@@ -88,7 +92,6 @@ impl Lockstep {
         for member in &mut self.members {
             (member.joined, member.ready) = (0, None);
         }
-        self.begun = 0;
         self.waiting_since_ns = None;
         self.changes = MemberChanges::default();
     }
@@ -102,18 +105,19 @@ impl Lockstep {
         until_ns: u64,
         mut report: impl FnMut(Event),
     ) -> bool {
+        let last = Published::new(publisher, step);
         let start_ns = monotonic_ns();
         let mut look_count = 0_u32;
         loop {
-            self.receive(publisher, step, &mut report);
-            if !self.is_waiting(step) {
+            self.receive(publisher, last, &mut report);
+            if !self.is_waiting(last) {
                 self.waiting_since_ns = None;
                 return true;
             }
             let now_ns = monotonic_ns();
-            self.remove_lost(publisher, step, now_ns, &mut report);
+            self.remove_lost(publisher, last, now_ns, &mut report);
             if now_ns >= until_ns {
-                return !self.is_waiting(step);
+                return !self.is_waiting(last);
             }
             look_count += 1;
             if now_ns > start_ns + SPIN_NS {
@@ -126,14 +130,13 @@ impl Lockstep {
         }
     }
 
-    /// Receives the messages that have arrived. `step` is the last one that was published.
+    /// Receives the messages that have arrived.
     pub(super) fn receive(
         &mut self,
         publisher: &Publisher,
-        step: u64,
+        last: Published,
         report: &mut impl FnMut(Event),
     ) {
-        let last = Published { run_id: publisher.run_id(), step };
         publisher.receive_ready(|message, connection| {
             // A closed connection may have left a message, but it is no member any more.
             if self.is_member(connection) || publisher.listed_members().contains(&connection) {
@@ -173,25 +176,15 @@ impl Lockstep {
         self.members.iter().any(|member| member.connection == connection)
     }
 
-    fn is_waiting(&self, step: u64) -> bool {
-        self.members.iter().any(|member| member.is_awaited(step, self.begun))
-    }
-
-    /// Begins a new count of steps for every member at a step that shows a state put in place.
-    pub(super) fn begin_state(&mut self, step: u64) {
-        self.begun = step;
-    }
-
-    /// Returns `true` for the newest step whose state a command has put in place.
-    pub(super) fn has_begun_at(&self, step: u64) -> bool {
-        self.begun == step && step > 0
+    fn is_waiting(&self, last: Published) -> bool {
+        self.members.iter().any(|member| member.is_awaited(last))
     }
 
     /// Removes the members that are gone, and those that the node has waited for too long.
     fn remove_lost(
         &mut self,
         publisher: &Publisher,
-        step: u64,
+        last: Published,
         now_ns: u64,
         report: &mut impl FnMut(Event),
     ) {
@@ -204,10 +197,10 @@ impl Lockstep {
             publisher.listed_members()
         };
         let waited = Duration::from_nanos(now_ns.saturating_sub(since_ns));
-        let (timeout, begun) = (self.timeout, self.begun);
+        let timeout = self.timeout;
         self.remove_gone(publisher, &connections, report);
         self.members.retain(|member| {
-            let has_timed_out = waited > timeout && member.is_awaited(step, begun);
+            let has_timed_out = waited > timeout && member.is_awaited(last);
             if has_timed_out {
                 let Member { client_id, every, .. } = *member;
                 report(Event::TimedOut { client_id, every, timeout });
@@ -252,13 +245,13 @@ impl Lockstep {
         });
     }
 
-    /// Returns the members in the order of joining. `step` is the last one that was published.
-    pub(super) fn members(&self, step: u64) -> impl Iterator<Item = MemberStatus> {
+    /// Returns the members in the order of joining.
+    pub(super) fn members(&self, last: Published) -> impl Iterator<Item = MemberStatus> {
         self.members.iter().map(move |member| MemberStatus {
             client_id: member.client_id,
             step: member.ready.unwrap_or(member.joined),
             every: u32::try_from(member.every).unwrap_or(u32::MAX),
-            is_awaited: u32::from(member.is_awaited(step, self.begun)),
+            is_awaited: u32::from(member.is_awaited(last)),
         })
     }
 }
@@ -280,30 +273,35 @@ mod tests {
         Lockstep::new(Duration::from_secs(1))
     }
 
+    fn last(step: u64) -> Published {
+        Published { run_id: RUN, step, is_in_place: false }
+    }
+
     #[test]
     fn a_member_is_awaited_at_its_steps_until_it_is_ready() {
         let mut lockstep = lockstep();
         let join = Ready { run_id: 0, ..ready(7, 0, 4) };
         let mut events = Vec::new();
         let mut add = |lockstep: &mut Lockstep, message, step| {
-            let last = Published { run_id: RUN, step };
-            lockstep.add(message, ConnectionId(1), last, &mut |event| events.push(event));
+            lockstep.add(message, ConnectionId(1), last(step), &mut |event| events.push(event));
         };
+        let is_waiting = |lockstep: &Lockstep, step| lockstep.is_waiting(last(step));
         add(&mut lockstep, join, 2);
-        assert!(lockstep.is_waiting(2), "the count begins at the step of joining");
+        assert!(is_waiting(&lockstep, 2), "the count begins at the step of joining");
         add(&mut lockstep, ready(7, 2, 4), 2);
-        assert!(!lockstep.is_waiting(2) && !lockstep.is_waiting(5) && lockstep.is_waiting(6));
+        assert_eq!([2, 5, 6].map(|step| is_waiting(&lockstep, step)), [false, false, true]);
         // An older message changes nothing, and one of another run neither.
         add(&mut lockstep, ready(7, 0, 4), 6);
         add(&mut lockstep, Ready { run_id: 8, ..ready(7, 8, 4) }, 8);
-        assert!(!lockstep.is_waiting(5) && lockstep.is_waiting(6));
+        assert_eq!([5, 6].map(|step| is_waiting(&lockstep, step)), [false, true]);
         // A state in place is a turn, and the count begins again.
         add(&mut lockstep, ready(7, 6, 4), 6);
-        lockstep.begin_state(7);
-        assert!(lockstep.is_waiting(7) && lockstep.has_begun_at(7) && !lockstep.has_begun_at(8));
-        assert!(!lockstep.is_waiting(8), "a member that was dropped there and joins again");
+        let in_place = Published { is_in_place: true, ..last(7) };
+        assert!(lockstep.is_waiting(in_place) && !is_waiting(&lockstep, 7));
+        assert!(!is_waiting(&lockstep, 8), "a member that was dropped there and joins again");
         add(&mut lockstep, ready(7, 7, 4), 7);
-        assert!(!lockstep.is_waiting(7) && !lockstep.is_waiting(10) && lockstep.is_waiting(11));
+        assert!(!lockstep.is_waiting(in_place));
+        assert_eq!([10, 11].map(|step| is_waiting(&lockstep, step)), [false, true]);
         assert_eq!(events, [Event::Joined { client_id: 7, every: 4 }]);
         assert_eq!(lockstep.refused_count, 0);
     }
@@ -319,20 +317,18 @@ mod tests {
             ready(7, 3, 1),
         ];
         for message in messages {
-            let last = Published { run_id: RUN, step: 2 };
-            lockstep.add(message, ConnectionId(1), last, &mut |_| panic!("joined"));
+            lockstep.add(message, ConnectionId(1), last(2), &mut |_| panic!("joined"));
         }
         assert_eq!(lockstep.refused_count, 4);
-        assert_eq!(lockstep.members(2).count(), 0);
+        assert_eq!(lockstep.members(last(2)).count(), 0);
     }
 
     #[test]
     fn the_lockstep_has_a_limit() {
         let mut lockstep = lockstep();
         for connection in 0..=MEMBERS_MAX as u128 {
-            let last = Published { run_id: RUN, step: 0 };
-            lockstep.add(ready(7, 0, 1), ConnectionId(connection), last, &mut |_| {});
+            lockstep.add(ready(7, 0, 1), ConnectionId(connection), last(0), &mut |_| {});
         }
-        assert_eq!((lockstep.members(0).count(), lockstep.refused_count), (MEMBERS_MAX, 1));
+        assert_eq!((lockstep.members(last(0)).count(), lockstep.refused_count), (MEMBERS_MAX, 1));
     }
 }

@@ -37,8 +37,6 @@ pub(crate) struct StepTimes {
 pub(crate) struct Position {
     pub(crate) step: u64,
     pub(crate) is_paused: bool,
-    /// A command has put the state of the step in place.
-    pub(crate) is_in_place: bool,
     /// Simulated time per wall-clock time.
     pub(crate) time_scale: f64,
     /// No further step follows for now, so late subscribers need this one.
@@ -94,8 +92,9 @@ pub(crate) struct Publisher {
     /// First step of the last load, or step of the last complete state that a command put in place. The
     /// torn constraints of the state count as torn in it.
     since_step: u64,
-    /// A step whose snapshot is published, whatever `every` says.
-    included_step: u64,
+    /// The newest step whose state a command has put in place, perhaps with the motion only. Its snapshot is published,
+    /// whatever `every` says.
+    in_place_step: u64,
     /// The colliders as last published, with room for all of the load.
     colliders: Vec<ColliderState>,
     forces: ForcesPublisher,
@@ -140,7 +139,7 @@ impl Publisher {
             parameters,
             torn: Vec::with_capacity(solver.constraint_count()),
             since_step: 0,
-            included_step: 0,
+            in_place_step: 0,
             colliders: Vec::with_capacity(solver.collider_count()),
             forces: ForcesPublisher::default(),
             phases: Phases::default(),
@@ -164,9 +163,14 @@ impl Publisher {
         states
     }
 
-    /// Publishes the snapshot of a coming step in any case.
-    pub(crate) fn include(&mut self, step: u64) {
-        self.included_step = step;
+    /// Notes that a coming step shows a state that a command has put in place.
+    pub(crate) fn show_in_place(&mut self, step: u64) {
+        self.in_place_step = step;
+    }
+
+    /// Returns `true` for the newest step whose state a command has put in place; step 0 of a run is none.
+    pub(crate) fn is_in_place(&self, step: u64) -> bool {
+        step > 0 && step == self.in_place_step
     }
 
     /// Identifies the scene.
@@ -214,7 +218,7 @@ impl Publisher {
         self.log(&outcome, 0);
         self.rejected_count += u64::from(result.is_err());
         if result == Ok(Applied::InPlace) {
-            self.since_step = step;
+            (self.since_step, self.in_place_step) = (step, step);
         }
         let is_same_state = result.is_err() || matches!(result, Ok(Applied::Control(_)));
         if is_same_state && self.same_state_count + 1 == self.outcome_count {
@@ -255,8 +259,8 @@ impl Publisher {
         self.times = times;
         self.publish_colliders(solver, position.step)?;
         self.publish_tears(solver, position.step)?;
-        let is_included = [self.since_step, self.included_step].contains(&position.step);
-        if !(position.step.is_multiple_of(self.every) || position.is_last || is_included) {
+        let is_due = position.step.is_multiple_of(self.every) || position.is_last;
+        if !is_due && !self.is_in_place(position.step) {
             return self.publish_outcomes();
         }
         self.publish_snapshot(solver, position)
@@ -465,10 +469,16 @@ impl Publisher {
             topology_revision: self.topology_revision,
             torn_count: count(solver.torn().len()),
             particle_count: count(solver.particle_count()),
-            flags: flags(position),
+            flags: self.flags(position),
             stride: u32::try_from(self.every).unwrap_or(u32::MAX),
             snapshot_index: self.snapshot_count,
         }
+    }
+
+    fn flags(&self, position: Position) -> u32 {
+        let paused = if position.is_paused { SnapshotFlags::PAUSED } else { 0 };
+        let is_in_place = self.is_in_place(position.step);
+        paused | if is_in_place { SnapshotFlags::IN_PLACE } else { 0 }
     }
 
     /// Same as [`Owner::start_wake_thread`].
@@ -485,11 +495,6 @@ impl Publisher {
     pub(crate) fn missing_file(&self) -> Option<PathBuf> {
         self.owner.missing_file()
     }
-}
-
-fn flags(position: Position) -> u32 {
-    let paused = if position.is_paused { SnapshotFlags::PAUSED } else { 0 };
-    paused | if position.is_in_place { SnapshotFlags::IN_PLACE } else { 0 }
 }
 
 /// Parameters of a solver with the time scale of the node.
@@ -542,10 +547,9 @@ mod tests {
         let (mut client, mut lists) = (Client::attach(&endpoint).unwrap(), 0);
         let mut step_on = |solver: &mut Solver, publisher: &mut Publisher, step: u64| {
             solver.step();
-            let is_in_place = step == 101;
-            let position =
-                Position { step, is_paused: false, is_in_place, time_scale: 1.0, is_last: false };
+            let position = Position { step, is_paused: false, time_scale: 1.0, is_last: false };
             publisher.publish_step(solver, position, StepTimes::default()).unwrap();
+            assert_eq!(publisher.is_in_place(step), step == 101);
             lists += u64::from(solver.new_torn_count() > 0);
             let torn = client.torn(Duration::from_secs(10)).unwrap();
             assert_eq!(torn.constraints, pairs(solver), "step {step}");

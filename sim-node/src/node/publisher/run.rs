@@ -76,7 +76,7 @@ impl Publisher {
         (self.last, self.keyframe) = (SnapshotHeader::default(), KeyframeHeader::default());
         (self.outcome_count, self.same_state_count, self.rejected_count) = (0, 0, 0);
         self.snapshot_count = 0;
-        (self.since_step, self.included_step) = (0, 0);
+        (self.since_step, self.in_place_step) = (0, 0);
         self.request_keyframe();
     }
 }
