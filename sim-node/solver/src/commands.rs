@@ -218,8 +218,8 @@ impl Solver {
     ///
     /// # Errors
     /// The parameter is unknown, the value has another form or is out of range, or the softness
-    /// belongs to the other method. A contact distance is out of range if at load each particle has more than 32
-    /// neighbours, on average, within 1.6 times of it, or 128 triangles.
+    /// belongs to the other method. A contact distance is out of range if at load it has more neighbours than
+    /// the solver can keep apart, of which a scene with this distance is warned, too.
     pub fn set(
         &mut self,
         name: &str,

@@ -239,3 +239,21 @@ fn rotation_between(from: &Waypoint, to: &Waypoint, share: f64) -> DQuat {
     let is_degenerate = blend.dot(blend) < 1e-12;
     if is_degenerate { if share < 0.5 { from } else { to } } else { blend }
 }
+
+#[cfg(test)]
+mod tests {
+    //! The room that a keyframe has for a motion.
+    use super::*;
+
+    #[test]
+    fn the_largest_size_of_a_motion_is_that_of_its_encoding() {
+        let size_bytes = |count| {
+            let points = vec![(f64::MAX, [f32::MAX; 3], [f32::MAX; 4]); count];
+            let state = MotionState { index: u32::MAX, start_step: u64::MAX, points };
+            postcard::to_allocvec(&state).unwrap().len()
+        };
+        // From 128 points on, their number takes a second byte.
+        assert_eq!(size_bytes(1) + 1, MOTION_SIZE_BYTES_MAX);
+        assert!(size_bytes(MOTION_POINTS_MAX) <= MOTION_POINTS_MAX * MOTION_SIZE_BYTES_MAX);
+    }
+}

@@ -255,6 +255,13 @@ impl Parameters {
             && self.block_bending == other.block_bending
     }
 
+    /// Adds the surfaces of the scene to parameters from a keyframe without surfaces.
+    pub(crate) fn add_surfaces(&mut self, initial: &Self) {
+        if self.surfaces.all().is_empty() {
+            self.surfaces.clone_from(&initial.surfaces);
+        }
+    }
+
     fn softness_bits(&self) -> [Option<u32>; 4] {
         self.softness.map(|softness| softness.map(f32::to_bits))
     }

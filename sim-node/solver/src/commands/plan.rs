@@ -69,7 +69,9 @@ impl Solver {
     pub fn plan_state(&self, keyframe: &Keyframe) -> Option<Plan> {
         self.check_keyframe(keyframe).ok()?;
         let tether_basis = self.settings.has_tethers().then(|| keyframe.tethers.clone());
-        self.plan_for(&keyframe.parameters, &keyframe.torn, tether_basis)
+        let mut parameters = keyframe.parameters.clone();
+        parameters.add_surfaces(&self.initial_parameters);
+        self.plan_for(&parameters, &keyframe.torn, tether_basis)
     }
 
     fn plan_for(
@@ -169,7 +171,29 @@ mod tests {
     use sim_types::{ParameterValue, Text};
 
     use super::*;
+    use crate::parameters::surfaces::Surfaces;
     use crate::scene::Scene;
+
+    #[test]
+    fn a_keyframe_without_surfaces_is_planned_with_the_surfaces_of_the_scene() {
+        let text = "version = 1\n[[collider]]\nshape = \"plane\"\nnormal = [0, 1, 0]\noffset = -1\nrestitution = 0.5\n[[generate]]\n\
+            shape = \"cloth\"\ncolumns = 40\nrows = 40\nspacing = 0.01\n";
+        let mut solver = Solver::new(&Scene::from_toml(text, "test").unwrap());
+        let (particles, mut keyframe) = (solver.particles().to_vec(), solver.keyframe());
+        keyframe.parameters.surfaces = Surfaces::default();
+        assert!(solver.plan_state(&keyframe).is_none(), "nothing changes");
+        solver.set("restitution", ParameterValue::Off, None).unwrap();
+        solver.finish_boundary();
+        let plan = solver.plan_state(&keyframe).unwrap();
+        solver.offer(plan.prepare(None));
+        let is_offered = |solver: &Solver| {
+            let offered = solver.offered.as_ref().unwrap().store.as_ref().unwrap();
+            offered.is_derived_from(&solver.initial_parameters)
+        };
+        assert!(is_offered(&solver));
+        solver.restore(&particles, &keyframe).unwrap();
+        assert!(!is_offered(&solver), "exchanged");
+    }
 
     #[test]
     fn a_boundary_takes_prepared_contacts_over_without_new_constraints() {

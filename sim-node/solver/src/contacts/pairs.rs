@@ -22,11 +22,12 @@ mod tile_tree;
 
 use box_tree::Search;
 use gathered::{Gathered, Room};
-pub(crate) use load::CONNECTED_REACH;
+pub(crate) use load::{CONNECTED_REACH, PAIRS_PER_PARTICLE};
 use load::{LaneMasks, LoadPairs};
 use loading::load_states;
 use order::{order_by_key, order_key};
 use pair::Pair;
+pub(crate) use surfaces::NEVER_PER_PARTICLE;
 use surfaces::{SurfaceContacts, SurfaceSearch};
 use tile::{TILE, TILE_LENGTH, members, take_lowest};
 use tile_tree::{Query, TileTree, search_order};

@@ -65,9 +65,7 @@ impl Solver {
         self.is_put_in_place = false;
         self.parameters.clone_from(&keyframe.parameters);
         self.parameters.block_bending.make_room_for(self.model.bent_blocks.len());
-        if keyframe.parameters.surfaces.all().is_empty() {
-            self.parameters.surfaces.clone_from(&self.initial_parameters.surfaces);
-        }
+        self.parameters.add_surfaces(&self.initial_parameters);
         self.follow_surfaces();
         self.restore_constraints(keyframe);
         self.restore_frames(keyframe);

@@ -4,7 +4,7 @@ use crate::action::Action;
 use crate::limits::STEP_WORK_MAX;
 use crate::parameter::{OffMeaning, PARAMETERS, Parameter, ParameterInfo, ValueForm};
 use crate::reason::Reason;
-use crate::suggestion::nearest;
+use crate::suggestion::did_you_mean;
 use crate::text::Text;
 
 impl ParameterInfo {
@@ -43,13 +43,11 @@ impl Action {
         }
     }
 
-    /// Returns the names of all parameters, and the one that is nearest to that of this action.
+    /// Returns the names of all parameters, and the one that the name in this action most likely stands for.
     fn known_parameters(&self) -> String {
         let names = PARAMETERS.map(|info| info.name);
         let Self::Set { parameter, .. } = self else { return names.join(", ") };
-        let nearest = nearest(parameter.as_str(), names);
-        let meant = nearest.map(|name| format!("; did you mean '{name}'?")).unwrap_or_default();
-        format!("{}{meant}", names.join(", "))
+        format!("{}{}", names.join(", "), did_you_mean(parameter.as_str(), names))
     }
 
     /// Returns the condition of the scene or its state under which this action has an effect, in words, if it was
@@ -197,7 +195,7 @@ mod tests {
             Action::Set { parameter, value, constraint_kind: None, block: None, collider: None };
         let values = action.allowed_values(Reason::UnknownParameter).unwrap();
         assert!(values.starts_with("gravity, damping, "), "{values}");
-        assert!(values.ends_with("; did you mean 'gravity'?"), "{values}");
+        assert!(values.ends_with(" (did you mean 'gravity'?)"), "{values}");
     }
 
     #[test]

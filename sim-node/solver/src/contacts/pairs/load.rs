@@ -11,7 +11,7 @@ use crate::scene::model::Model;
 pub(crate) const CONNECTED_REACH: f32 = 1.6;
 /// Largest number of near pairs at load for each particle, on average. It bounds memory. Further pairs touch as all
 /// others, so a contact distance with more of them is refused.
-const PAIRS_PER_PARTICLE: usize = 32;
+pub(crate) const PAIRS_PER_PARTICLE: usize = 32;
 
 /// Returns the particles that take part in contacts in the order of their slots. Each tile, and each node
 /// of the tree above, holds neighbours at load: it is one half of a cut across the longest side of the

@@ -42,7 +42,7 @@ use triangle_tiles::{AtLoad, TriangleTiles, Wanted};
 
 /// Largest number of triangles that a particle never touches, on average. Further ones touch it as all others, so a
 /// contact distance with more of them is refused.
-const NEVER_PER_PARTICLE: usize = 128;
+pub(crate) const NEVER_PER_PARTICLE: usize = 128;
 
 /// Fewest candidates that a worker examines.
 const TOUCH_MIN: usize = 128;

@@ -10,7 +10,9 @@ use crate::contacts::colliders::Collider;
 use crate::contacts::contact_substep::{ContactSubstep, Interval};
 use crate::contacts::mesh::near::NearMeshes;
 use crate::contacts::mesh::{PUSHES_MAX, PlacedMesh, Stop};
-use crate::contacts::pairs::{CONNECTED_REACH, ParticleContacts};
+use crate::contacts::pairs::{
+    CONNECTED_REACH, NEVER_PER_PARTICLE, PAIRS_PER_PARTICLE, ParticleContacts,
+};
 use crate::contacts::path::SubstepPath;
 use crate::contacts::solid::{Solid, solids};
 use crate::kernels::Kernels;
@@ -222,8 +224,8 @@ pub(super) fn overfull(scene: &Scene, model: &Model) -> Option<String> {
     let (mode, kernels) = (scene.contact.mode, Kernels::best());
     ParticleContacts::new(model, mode, Some(thickness), kernels).are_overfull().then(|| {
         format!(
-            "contact.thickness: at load, each particle has more than 32 other particles or 128 triangles, on average, \
-             within {} {unit}, 1.6 times the thickness: some of them repel each other from the first step on; use a \
+            "contact.thickness: at load, each particle has more than {PAIRS_PER_PARTICLE} other particles or \
+             {NEVER_PER_PARTICLE} triangles, on average, within {} {unit}, {CONNECTED_REACH} times the thickness: some of them repel each other from the first step on; use a \
              smaller thickness",
             three_digits(f64::from(CONNECTED_REACH * thickness)),
             unit = scene.unit,
