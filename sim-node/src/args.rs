@@ -127,8 +127,8 @@ pub(crate) fn try_parse(
     Ok(args)
 }
 
-/// Refuses a first word that is more like a subcommand than like a scene, or is followed by words as no
-/// scene is: clap takes it for the scene of `run`, and would find fault with the word behind it.
+/// Refuses a first word that is neither a scene nor a subcommand, if it resembles a subcommand or a second word follows.
+/// Otherwise, clap would take it for the scene of `run` and refuse the second word.
 fn check_first_word(command: &mut Command, words: &[OsString]) -> Result<(), clap::Error> {
     let Some(word) = words.get(1).and_then(|word| word.to_str()) else { return Ok(()) };
     if word.starts_with('-')

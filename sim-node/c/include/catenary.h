@@ -696,7 +696,8 @@ typedef struct {
   uint64_t client_id;
   // Last step that the member was ready for; the step of its joining if there is none.
   uint64_t step;
-  // Fewest steps from one turn of the member to the next.
+  // Distance of the member's turns, in steps: a turn is at the first published step that is at least so many steps
+  // after the last turn.
   uint32_t every;
   // 1 if the node waits for this member, otherwise 0.
   uint32_t is_awaited;
@@ -708,7 +709,7 @@ typedef struct {
   uint64_t client_id;
   // Last step that was computed before the change.
   uint64_t step;
-  // Fewest steps from one turn of the member to the next.
+  // Distance of the member's turns, in steps, as in `catenary_member_status`.
   uint32_t every;
   // A `catenary_member_change_kind` as a number.
   uint32_t kind;
@@ -942,8 +943,9 @@ catenary_command catenary_command_cut_segment(const float *from,
                                               const float *to,
                                               const float *direction);
 
-// Moves an anchor to a pose by the end of the next step, or within the time of `catenary_command_with_over`, where it stays. `translation` (3 numbers, in m)
-// and `rotation` (quaternion x, y, z, w) are relative to the pose at load. A null rotation is none.
+// Moves an anchor to a pose, where it stays: by the end of the next step, or in the time that
+// `catenary_command_with_over` gives. `translation` (3 numbers, in m) and `rotation` (quaternion x, y, z, w) are relative to
+// the pose at load. A null `rotation` is no rotation.
 catenary_command catenary_command_move_anchor(uint32_t anchor,
                                               const float *translation,
                                               const float *rotation);
@@ -956,7 +958,7 @@ catenary_command catenary_command_move_collider(uint32_t collider,
 
 // Gives a `catenary_command_move_anchor` or `catenary_command_move_collider` the time in which it reaches its pose, in
 // seconds: 0 to 3600, rounded up to whole steps, at least one. Other commands stay as they are.
-catenary_command catenary_command_with_over(catenary_command command,
+catenary_command catenary_command_with_over(catenary_command motion,
                                             float over_s);
 
 // Leads an anchor (`object` is `CATENARY_OPTION_ANCHOR`), a collider (`CATENARY_OPTION_COLLIDER`) or a particle that this
@@ -1085,10 +1087,13 @@ catenary_result catenary_read_status(catenary_client *client,
                                      double timeout_s,
                                      catenary_node_status *status);
 
-// Joins the lockstep: from now on, the node computes the step after a snapshot only when this client has
-// called `catenary_ready` for it, in every `every`-th step; 1 is each step. The count begins at the step of joining, and
-// again at each step that shows a load, a reset, a rewind or a restored state, which is a turn itself. The commands that
-// the client sends before `catenary_ready` take effect in the next step, so the run is the same each time.
+// Joins the lockstep: from now on, the node waits in each turn of this client until the client has called
+// `catenary_ready`. The commands that the client sends before that take effect in the next step, so the run is the same each
+// time.
+//
+// The first turn is at the step of joining, and each further turn `every` steps after the last one; 1 is each step. A step
+// that shows a load, a reset, a rewind or a restored state is always a turn, and so is step 0 of a new run; the next turn
+// counts from there. A turn that falls on a step that the node does not publish (--every) moves to the next published step.
 //
 // The node goes on without a client that it has waited for too long: 2 s, unless it was started with
 // another --lockstep-timeout. `catenary_missed_turns` shows it.

@@ -131,8 +131,9 @@ pub extern "C" fn catenary_command_cut_segment(
     command(all.map(|((from, to), direction)| Action::CutSegment { from, to, direction }))
 }
 
-/// Moves an anchor to a pose by the end of the next step, or within the time of `catenary_command_with_over`, where it stays. `translation` (3 numbers, in m)
-/// and `rotation` (quaternion x, y, z, w) are relative to the pose at load. A null rotation is none.
+/// Moves an anchor to a pose, where it stays: by the end of the next step, or in the time that
+/// `catenary_command_with_over` gives. `translation` (3 numbers, in m) and `rotation` (quaternion x, y, z, w) are relative to
+/// the pose at load. A null `rotation` is no rotation.
 #[unsafe(no_mangle)]
 pub extern "C" fn catenary_command_move_anchor(
     anchor: u32,
@@ -161,17 +162,17 @@ pub extern "C" fn catenary_command_move_collider(
 /// Gives a `catenary_command_move_anchor` or `catenary_command_move_collider` the time in which it reaches its pose, in
 /// seconds: 0 to 3600, rounded up to whole steps, at least one. Other commands stay as they are.
 #[unsafe(no_mangle)]
-pub extern "C" fn catenary_command_with_over(command: Command, over_s: f32) -> Command {
-    let action = match command.action() {
+pub extern "C" fn catenary_command_with_over(motion: Command, over_s: f32) -> Command {
+    let action = match motion.action() {
         Action::MoveAnchor { anchor, translation, rotation, .. } => {
             Action::MoveAnchor { anchor, translation, rotation, over_s }
         }
         Action::MoveCollider { collider, translation, rotation, .. } => {
             Action::MoveCollider { collider, translation, rotation, over_s }
         }
-        _ => return command,
+        _ => return motion,
     };
-    Command::new(command.client_id, command.sequence, action)
+    command(Some(action))
 }
 
 /// Leads an anchor (`object` is `CATENARY_OPTION_ANCHOR`), a collider (`CATENARY_OPTION_COLLIDER`) or a particle that this

@@ -8,10 +8,13 @@ use crate::outcome::{CatenaryResult, Failure};
 use crate::pointers::{check_place, timeout, write};
 use crate::snapshots::{Snapshot, keep};
 
-/// Joins the lockstep: from now on, the node computes the step after a snapshot only when this client has
-/// called `catenary_ready` for it, in every `every`-th step; 1 is each step. The count begins at the step of joining, and
-/// again at each step that shows a load, a reset, a rewind or a restored state, which is a turn itself. The commands that
-/// the client sends before `catenary_ready` take effect in the next step, so the run is the same each time.
+/// Joins the lockstep: from now on, the node waits in each turn of this client until the client has called
+/// `catenary_ready`. The commands that the client sends before that take effect in the next step, so the run is the same each
+/// time.
+///
+/// The first turn is at the step of joining, and each further turn `every` steps after the last one; 1 is each step. A step
+/// that shows a load, a reset, a rewind or a restored state is always a turn, and so is step 0 of a new run; the next turn
+/// counts from there. A turn that falls on a step that the node does not publish (--every) moves to the next published step.
 ///
 /// The node goes on without a client that it has waited for too long: 2 s, unless it was started with
 /// another --lockstep-timeout. `catenary_missed_turns` shows it.

@@ -7,21 +7,21 @@ use anyhow::Context;
 use sim_contract::Reason;
 use sim_solver::{Blocks, Chain, Keyframe, Particle, Solver};
 
-/// Most places where the run continued from another state than the last one. Beyond it the oldest are
-/// forgotten, and steps back across them are counted as if they did not exist.
+/// Most rewinds to remember. Beyond it the oldest rewinds are forgotten, and steps back across them are counted as if they
+/// had not happened.
 const BRANCHES_MAX: usize = 4096;
 
-/// The list of the states takes at least one part in so many of the memory, for smaller scenes that a load brings.
+/// The list of the states takes at least 1/16 of the memory, because a load may bring a scene with smaller states.
 const LIST_PART: usize = 16;
 /// Fewest particles for which a state takes memory.
 const PARTICLES_MIN: usize = 8;
-/// Memory in the list for a state, and for a keyframe that it does not share.
+/// Size of the list's entry for a state with a keyframe of its own.
 const ENTRY_SIZE_BYTES: usize = size_of::<KeptState>() + size_of::<(usize, usize, KeptKeyframe)>();
 
 /// Kept states, with their keyframes, in a fixed memory.
 ///
-/// Each step is kept while it fits. Then every second state of the older half is removed, again and
-/// again, so that the distance between states grows with their age. The oldest one stays.
+/// Each step is kept while there is room. Whenever the memory is full, every second state of the older half is removed,
+/// so that the distance between states grows with their age. The oldest state stays.
 #[derive(Debug)]
 pub(super) struct History {
     /// By ascending step, all of the same scene.
@@ -50,7 +50,7 @@ struct KeptKeyframe {
     size_bytes: usize,
 }
 
-/// A step whose state was put in place: it is that of an earlier step.
+/// A step whose state is a copy of the state of an earlier step, which a rewind put in place.
 #[derive(Debug, Clone, Copy)]
 struct Branch {
     step: u64,

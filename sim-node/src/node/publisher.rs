@@ -321,8 +321,8 @@ impl Publisher {
         Ok(())
     }
 
-    /// Publishes all torn constraints if a constraint tore or was restored in this step. Only the new ones are added to the
-    /// list, unless a command put another state in place.
+    /// Publishes the list of all torn constraints if a constraint tore or was restored in this step. The constraints that
+    /// tore are appended to the list; after a load, or a command that put a complete state in place, the list is made anew.
     fn publish_tears(&mut self, solver: &Solver, step: u64) -> anyhow::Result<()> {
         let (torn, new_count) = (solver.torn(), solver.new_torn_count());
         let is_continued = step != self.since_step;
@@ -331,7 +331,7 @@ impl Publisher {
         if new_count == 0 && (is_same_list || are_none) {
             return Ok(());
         }
-        // Those before the new ones are the published ones.
+        // The constraints before the new ones are in the published list.
         let kept_count = if is_continued { torn.len() - new_count } else { 0 };
         self.torn.truncate(kept_count);
         let pairs = torn.iter().zip(solver.tear_causes()).skip(self.torn.len());

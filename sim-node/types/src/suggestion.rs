@@ -1,10 +1,10 @@
-//! The nearest known word to an unknown one, for error messages.
+//! The known word that is nearest to an unknown one, for error messages.
 
 /// Returns the known word that an unknown word most likely stands for, or `None` if no word is similar.
 ///
-/// A typing error is a letter that is missing, added or wrong, or two neighbours in the wrong order; one
-/// in three letters may have one. Upper case, and `_` for `-`, are no errors. Without such a word, one of
-/// whose parts the word is the first or the last is returned: `friction` stands for `contact_friction`.
+/// A typing error is a missing, added or wrong letter, or two swapped neighbours. A known word is similar if there is at
+/// most one error for each three letters; case, and `_` in place of `-`, do not count. If no word is similar, a known word
+/// that begins or ends with the unknown one is returned: `friction` stands for `contact_friction`.
 pub fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let plain = |word: &str| word.trim_start_matches('-').to_lowercase().replace(['_', ' '], "-");
     let word = plain(word);

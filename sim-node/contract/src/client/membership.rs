@@ -24,9 +24,11 @@ impl Client {
     }
 
     /// Joins the lockstep, drops unread snapshots, and takes part only in every `every`-th step, as a controller of
-    /// 60 Hz does beside a node of 240 Hz with `every` = 4. The count begins at the step of joining, and again at each
-    /// step that shows a load, a reset, a rewind or a restored state, which is a turn itself. A node with `--every` has
-    /// the turn at the next step that it publishes.
+    /// 60 Hz does beside a node of 240 Hz with `every` = 4.
+    ///
+    /// The first turn is at the step of joining, and each further turn `every` steps after the last one. A step that shows
+    /// a load, a reset, a rewind or a restored state is always a turn, and so is step 0 of a new run; the next turn counts
+    /// from there. A turn that falls on a step that the node does not publish (`--every`) moves to the next published step.
     ///
     /// # Errors
     /// Same as [`Client::join_lockstep`].

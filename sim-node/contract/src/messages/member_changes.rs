@@ -31,7 +31,7 @@ pub struct MemberChange {
     pub client_id: u64,
     /// Last step that was computed before the change.
     pub step: u64,
-    /// Fewest steps from one turn of the member to the next.
+    /// Distance of the member's turns, in steps, as in [`crate::MemberStatus`].
     pub every: u32,
     /// A [`MemberChangeKind`] as a number.
     pub kind: u32,

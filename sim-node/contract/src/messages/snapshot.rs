@@ -82,6 +82,6 @@ impl SnapshotFlags {
     /// The writer plays a recording; it is not a live node.
     pub const REPLAY: u32 = 1 << 1;
     /// A `load`, `reset`, `rewind` or `restore` command has put this state in place: nothing was integrated in
-    /// this step. It is a turn of every member of the lockstep. Not set in a replay.
+    /// this step. It is a turn of every member of the lockstep. Not set in step 0 of a run, nor in a replay.
     pub const IN_PLACE: u32 = 1 << 2;
 }

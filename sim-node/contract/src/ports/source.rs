@@ -11,15 +11,16 @@ use crate::ports::domain::owner_lock::LockPlace;
 use crate::ports::service::OWNER_PORT;
 use crate::ports::session::{Values, version_of};
 
-/// Most processes to remember: the present owner, earlier ones with unread messages, and processes that are none.
+/// Most processes to remember: the present owner, earlier owners with unread messages, and processes that only claim to be
+/// the owner.
 const REMEMBERED_MAX: usize = 8;
 
 /// Accepts the messages of the owner of a name, and refuses those of every other process.
 ///
 /// A service has room for more publishers than the owner needs, and iceoryx2 lets any process publish.
-/// The owner has a publisher of `status` with a name of its own, and is the process that holds the lock; at the far
-/// end of a tunnel, the tunnel stands for it. Messages of an earlier owner may still be unread when another one has
-/// taken the name, so it is remembered.
+/// The owner is the process that holds the lock, and its publisher of `status` has the name [`OWNER_PORT`]. Behind a
+/// tunnel, the process of the tunnel counts as the owner. An earlier owner is remembered, because its messages may still be
+/// unread when another process has taken the name.
 #[derive(Debug)]
 pub(crate) struct Source {
     status: Arc<Values<NodeStatus>>,
@@ -28,7 +29,7 @@ pub(crate) struct Source {
     remembered: Mutex<VecDeque<Remembered>>,
 }
 
-/// An iceoryx2 node with a publisher that is named as an owner's.
+/// An iceoryx2 node with a publisher of the name [`OWNER_PORT`].
 #[derive(Debug, Clone, Copy)]
 struct Remembered {
     node: UniqueNodeId,

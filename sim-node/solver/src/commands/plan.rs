@@ -18,8 +18,8 @@ const CONSTRAINTS_MIN: usize = 2000;
 const CONTACTS_MIN: usize = 500;
 
 impl Solver {
-    /// Returns the work that makes a reset, a pin, or settings that follow each other, cheap. None if they are
-    /// cheap already, if [`Self::apply`] rejects them, and for other actions.
+    /// Returns the work that another thread can do in advance for a reset, a pin, or settings that follow each other. `None`
+    /// if there is little to do, if [`Self::apply`] rejects the actions, and for all other actions.
     pub fn plan(&self, actions: impl IntoIterator<Item = Action>) -> Option<Plan> {
         let (mut parameters, mut affected) = (self.parameters.clone(), Affected::Nothing);
         for action in actions {
@@ -64,8 +64,8 @@ impl Solver {
         self.plan_for(&self.parameters, self.torn(), Some(basis))
     }
 
-    /// Returns the work that makes [`Self::restore`] and [`Self::put_in_place`] cheap; None if they are
-    /// cheap already, and for a keyframe that they reject.
+    /// Returns the work that another thread can do in advance for [`Self::restore`] or [`Self::put_in_place`]. `None` if
+    /// there is little to do, and for a keyframe that does not belong to the scene.
     pub fn plan_state(&self, keyframe: &Keyframe) -> Option<Plan> {
         self.check_keyframe(keyframe).ok()?;
         let tether_basis = self.settings.has_tethers().then(|| keyframe.tethers.clone());
@@ -104,22 +104,21 @@ impl Solver {
         })
     }
 
-    /// Offers prepared constraints to the commands of the next boundary. Constraints of another scene
-    /// are ignored.
+    /// Offers prepared constraints and contacts to the commands of the next boundary. An offer for another scene is
+    /// ignored.
     pub fn offer(&mut self, prepared: Prepared) {
         if Arc::ptr_eq(&prepared.model, &self.model) {
             self.offered = Some(Box::new(prepared));
         }
     }
 
-    /// Withdraws the offer after the boundary. Returns the memory that is free then; None without an
-    /// offer.
+    /// Ends the offer after the boundary. Returns its memory, for the next plan; `None` without an offer.
     pub fn withdraw(&mut self) -> Option<Spare> {
         self.offered.take().map(Spare)
     }
 
-    /// Takes offered constraints over if they have the current parameters. Returns true if all
-    /// particles have new locations then.
+    /// Exchanges the constraints for the offered ones if only those have the current parameters. Returns true if it has:
+    /// particles have other locations then.
     pub(crate) fn accept_constraints(&mut self) -> bool {
         let Self { offered, store, parameters, .. } = self;
         let offered = offered.as_mut().and_then(|offered| offered.store.as_mut());
@@ -129,7 +128,7 @@ impl Solver {
         if let Some(offered) = offered {
             store.exchange(offered);
             if self.settings.has_tethers() {
-                // Those that it had when it was in use.
+                // The offered store may have tethers from its last use.
                 store.detach_tethers(self.model.particle_count());
             }
             return true;
@@ -137,7 +136,7 @@ impl Solver {
         false
     }
 
-    /// Returns the offered contacts if they have this distance.
+    /// Returns the offered contacts if they were derived for this contact distance.
     pub(crate) fn take_offered_contacts(
         &mut self,
         thickness: Option<f32>,
@@ -146,14 +145,14 @@ impl Solver {
         offered.take_if(|offered| offered.are_derived_from(thickness))
     }
 
-    /// Gives contacts away in the place of those that were taken, so that another thread frees their memory.
+    /// Puts replaced contacts into the offer, from where another thread frees their memory.
     pub(crate) fn give_away(&mut self, contacts: ParticleContacts) {
         if let Some(offered) = &mut self.offered {
             offered.particle_contacts.get_or_insert(contacts);
         }
     }
 
-    /// Takes offered tethers over if they have this basis.
+    /// Exchanges the tethers for the offered ones if those were derived from this basis. Returns true if it has.
     pub(crate) fn accept_tethers(&mut self, basis: &TetherBasis) -> bool {
         let Self { offered, tethers, parameters, .. } = self;
         let offered = offered.as_mut().map(|offered| &mut offered.tethers);
@@ -210,7 +209,7 @@ mod tests {
         let plan = solver.plan([set(0.02)]).unwrap();
         assert!(!plan.has_new_constraints);
         solver.offer(plan.prepare(None));
-        // Another distance than that of the offer.
+        // The offer is for another distance.
         let is_offered = |solver: &Solver, thickness| {
             let offered = solver.offered.as_ref().unwrap().particle_contacts.as_ref().unwrap();
             offered.are_derived_from(Some(thickness))

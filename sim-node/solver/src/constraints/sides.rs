@@ -9,20 +9,20 @@
 /// with a torn side has no effect.
 #[derive(Debug, Clone, Default)]
 pub struct TornSides {
-    /// By constraint: index of its first owner in `owners`. One more entry at the end; empty without sides.
+    /// By constraint: index of its first owner in `owners`, and at the end the length of `owners`. Empty without sides.
     starts: Vec<u32>,
-    /// The triangles or bends that have the particles of a constraint as a side, ascending.
+    /// By constraint: the triangles or bends of which the constraint is a side, ascending.
     owners: Vec<u32>,
-    /// Constraints that join the same particles as others, ascending, with the index of their side in `intact_counts`.
+    /// Constraints of the sides with several constraints, ascending, each with the index of its side in `intact_counts`.
     duplicates: Vec<(u32, u32)>,
-    /// By side with several constraints: number of constraints that are not torn.
+    /// By side with several constraints: number of its intact constraints.
     intact_counts: Vec<u32>,
     /// By triangle or bend: number of torn sides.
     torn_counts: Vec<u8>,
 }
 
 impl TornSides {
-    /// Finds the sides of triangles among the constraints with these ends, none of which is torn.
+    /// Finds the constraints on the sides of triangles. `ends` are the particles of each constraint; no constraint is torn.
     pub fn of_triangles(
         ends: impl Iterator<Item = [u32; 2]>,
         triangles: impl ExactSizeIterator<Item = [u32; 3]>,
@@ -34,7 +34,7 @@ impl TornSides {
         Self::new(ends, owner_count, sides)
     }
 
-    /// Finds sides, each with the index of its owner, among the constraints with these ends.
+    /// Finds the constraints on sides, each with the index of its triangle or bend.
     #[allow(clippy::cast_possible_truncation, reason = "at most 2^24 constraints and triangles")]
     pub(crate) fn new(
         ends: impl Iterator<Item = [u32; 2]>,
@@ -74,7 +74,7 @@ impl TornSides {
         all
     }
 
-    /// Follows a constraint that has torn, or is no longer torn. Returns true if its side has changed with it.
+    /// Counts a constraint that has torn or is restored. Returns true if its side is torn or restored with it.
     pub fn follow(&mut self, constraint: u32, is_torn: bool) -> bool {
         if let Ok(place) = self.duplicates.binary_search_by_key(&constraint, |(one, _)| *one) {
             let intact_count = &mut self.intact_counts[self.duplicates[place].1 as usize];
@@ -91,7 +91,7 @@ impl TornSides {
         true
     }
 
-    /// Replaces all torn constraints by these, each of which is named once.
+    /// Replaces the torn constraints. `torn` names each one once.
     pub fn set_torn(&mut self, torn: impl Iterator<Item = u32>) {
         self.torn_counts.fill(0);
         self.intact_counts.fill(0);
@@ -108,7 +108,7 @@ impl TornSides {
         self.torn_counts[owner as usize] == 0
     }
 
-    /// The triangles or bends that have the particles of a constraint as a side.
+    /// The triangles or bends of which a constraint is a side.
     pub(crate) fn owners(&self, constraint: u32) -> &[u32] {
         &self.owners[self.places(constraint)]
     }

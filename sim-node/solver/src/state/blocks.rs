@@ -10,16 +10,16 @@ use crate::state::particles::Particle;
 
 /// A fixed memory in blocks of one size. A state takes as many as it needs.
 ///
-/// All of the memory is in use from the start, so that a copy neither allocates nor waits for a page. It
-/// goes past the caches, which then keep what the next step needs.
+/// Every page of the memory is written at the start, so that storing a state neither allocates nor waits for a page.
+/// The copy bypasses the caches, which keep the data of the next step.
 #[derive(Debug, Default)]
 pub struct Blocks {
     particles: Vec<Particle>,
     /// Particles of a block.
     length: usize,
-    /// By block: the next one of its chain.
+    /// By block: the next block of its chain.
     next: Vec<u32>,
-    /// The first of the chain of free blocks.
+    /// First block of the chain of free blocks.
     first_free: u32,
     free_count: usize,
 }

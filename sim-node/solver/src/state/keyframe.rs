@@ -17,9 +17,9 @@ use crate::step::drive::ActiveGrab;
 
 /// First four bytes of an encoded keyframe, little-endian. It changes with the fields below.
 const KEYFRAME_VERSION: u32 = 5;
-/// The version before the surfaces of colliders could change, and before motions lasted longer than a grab's horizon.
+/// The version without the surfaces of colliders and without motions.
 const WITHOUT_SURFACES_VERSION: u32 = 4;
-/// The version before blocks could have a bending of their own.
+/// The version that is also without the bending of blocks.
 const WITHOUT_BLOCKS_VERSION: u32 = 3;
 
 /// The state beside the particles of a snapshot. Both together are the complete state after a step.
@@ -40,12 +40,12 @@ pub struct Keyframe {
     /// Anchors and colliders that clients have moved, ascending by index.
     pub(super) moved_anchors: Vec<Moved>,
     pub(super) moved_colliders: Vec<Moved>,
-    /// The motions of clients, which move those, and the targets of grabs. Encoded behind the other fields.
+    /// The motions, begun by clients, of grab targets, anchors and colliders. Encoded behind the other fields.
     #[serde(skip)]
     pub(super) motions: Motions,
 }
 
-/// Motions by object, ascending by its index.
+/// The motions of each kind of object, ascending by the index of the particle, anchor or collider.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Motions {
     pub(super) grabs: Vec<MotionState>,

@@ -1,4 +1,4 @@
-//! Where the bends of a scene are, and which of them have stopped.
+//! Where the bends of a scene are stored, and which of them have no effect because of tears.
 
 use super::layout::Location;
 use crate::constraints::sides::TornSides;
@@ -9,7 +9,7 @@ use crate::scene::model::Model;
 pub(crate) struct StoredBends {
     /// By bend.
     pub(crate) locations: Vec<Location>,
-    /// The sides of their paths. A bend acts while none of them is torn.
+    /// The sides of the paths of bends. A bend with a torn side has no effect.
     pub(crate) sides: TornSides,
 }
 

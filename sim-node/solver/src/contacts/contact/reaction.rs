@@ -137,10 +137,11 @@ pub(crate) fn take_impulses<'a>(
     total.angular += DVec3::from_array(sum.angular.map(|units| units as f64)) / scale;
 }
 
-/// Adds numbers of units, rounded towards zero. One that is not finite, or beyond all colliders' reach, saturates.
+/// Adds a vector in whole units to sums, rounded towards zero. A component beyond the range of i128 adds its nearest end,
+/// and NaN adds 0.
 fn add_whole(sums: &mut [i128; 3], units: DVec3) {
     for (sum, units) in sums.iter_mut().zip(units.to_array()) {
-        #[allow(clippy::cast_possible_truncation, reason = "rounds and saturates, as it should")]
+        #[allow(clippy::cast_possible_truncation, reason = "rounds towards zero and saturates")]
         let units = units as i128;
         *sum = sum.wrapping_add(units);
     }

@@ -22,23 +22,23 @@ pub struct FaceDetails {
     pub materials: Vec<NameRun>,
 }
 
-/// The name of the faces from one of them up to the next run.
+/// A name of consecutive faces: from the face `first` up to the first face of the next run.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct NameRun {
-    /// One line of text. An empty name ends the run before.
+    /// One line of text. If it is empty, the faces have no name.
     pub name: String,
     /// Index of the first face with this name.
     pub first: u32,
 }
 
 impl NameRun {
-    /// Returns the name of a face, if it has one. `runs` ascend.
+    /// Returns the name of a face, or `None` if it has no name. `runs` are sorted by their first faces.
     pub fn of_face(runs: &[Self], face: usize) -> Option<&str> {
         let count = runs.partition_point(|run| run.first as usize <= face);
         runs[..count].last().map(|run| run.name.as_str()).filter(|name| !name.is_empty())
     }
 
-    /// Returns the runs of the kept faces, which ascend, by their new index.
+    /// Returns the runs of a mesh of which only the faces `kept` are left. `kept` has ascending indices of faces.
     pub(super) fn of_kept(runs: &[Self], kept: &[usize]) -> Vec<Self> {
         let mut new: Vec<Self> = Vec::new();
         for (first, face) in (0..).zip(kept) {

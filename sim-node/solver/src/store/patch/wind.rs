@@ -2,8 +2,7 @@
 //!
 //! Each cell has two triangles: upper left, lower left, lower right; and upper left, lower right, upper
 //! right. The wind on eight cells is computed at once. Then eight particles sum it, each over its six
-//! triangles in their order in the scene. At the border, triangles that are not there add 0, and so do those with a
-//! torn side.
+//! triangles in their order in the scene. Missing triangles at the border add 0, and so do triangles with a torn side.
 
 use crate::constraints::sides::TornSides;
 use crate::kernels::huge_pages::refill;
@@ -26,16 +25,16 @@ pub(crate) struct SheetWindWork<'a> {
 /// The torn triangles of a sheet.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct TornCells {
-    /// By cell: 1 if its triangle at the lower left is torn, else 0. A row has [`MARGIN`] numbers in front of its
-    /// first cell. The first row belongs to the cells above the first particles, and the last one to those below the last.
+    /// By cell: 1 if its lower left triangle has a torn side, else 0. A row begins with [`MARGIN`] zeros. Row r has the cells
+    /// between the rows r - 1 and r of particles, so the first and the last row have no cells of the sheet.
     lower: Vec<f32>,
-    /// The same for the triangles at the upper right.
+    /// By cell: the same for its upper right triangle.
     upper: Vec<f32>,
     row_length: usize,
     are_any: bool,
 }
 
-/// Numbers in front of a row of torn cells, for the cells left of the first column.
+/// Zeros at the start of each row of [`TornCells`], for the missing cells left of the first column.
 const MARGIN: usize = 8;
 
 impl TornCells {
@@ -67,7 +66,7 @@ impl TornCells {
         }
     }
 
-    /// Number of the torn triangles around eight particles.
+    /// Number of torn triangles around each of eight particles.
     #[inline(always)]
     fn count<W: Wide>(&self, row: usize, column: usize) -> W {
         let load = |torn: &[f32], at| W::load(&lane_groups(torn, at, 1)[0], 0);
@@ -82,7 +81,7 @@ impl TornCells {
             + load(upper_below, right)
     }
 
-    /// The lower and the upper triangles of the cells above a row of particles.
+    /// The lower left and the upper right triangles of the cells above a row of particles.
     #[inline(always)]
     fn above(&self, row: usize) -> [&[f32]; 2] {
         let numbers = row * self.row_length..(row + 1) * self.row_length;
@@ -125,7 +124,7 @@ impl LaneWork for SheetWindWork<'_> {
 }
 
 impl SheetWindWork<'_> {
-    /// It is compiled with torn triangles and without, which therefore cost nothing.
+    /// Compiled twice, so that sheets without torn triangles do not pay for them.
     #[inline(always)]
     fn blow<W: Wide, const ARE_TORN: bool>(&mut self) {
         let RowLayout { columns, rows, .. } = *self.layout;
