@@ -81,19 +81,20 @@ pub(super) fn from_verb(
                 None => None,
             },
         },
-        CommandVerb::Follow(FollowArgs { object, index, path, append }) => {
-            let rows = rows(path)?;
-            let points: Vec<_> = rows.iter().map(|row| row.point).collect();
-            return Action::follow(*object, *index, &points, *append).map_err(
-                |error| match error {
-                    PathError::Point { index, fault } => {
-                        anyhow!("{}:{}: {fault}", path.display(), rows[index].line)
-                    }
-                    PathError::Length { .. } => anyhow!("{}: {error}", path.display()),
-                },
-            );
-        }
+        CommandVerb::Follow(args) => return follow(args),
     }])
+}
+
+fn follow(args: &FollowArgs) -> anyhow::Result<Vec<Action>> {
+    let FollowArgs { object, index, path, append } = args;
+    let rows = rows(path)?;
+    let points: Vec<_> = rows.iter().map(|row| row.point).collect();
+    Action::follow(*object, *index, &points, *append).map_err(|error| match error {
+        PathError::Point { index, fault } => {
+            anyhow!("{}:{}: {fault}", path.display(), rows[index].line)
+        }
+        PathError::Length { .. } => anyhow!("{}: {error}", path.display()),
+    })
 }
 
 /// A point in a file.
