@@ -696,7 +696,7 @@ typedef struct {
   uint64_t client_id;
   // Last step that the member was ready for; the step of its joining if there is none.
   uint64_t step;
-  // Distance of the member's turns, in steps: a turn is at the first published step that is at least so many steps
+  // Distance of the member's turns, in steps: a turn is at the first published step that is this distance or more
   // after the last turn.
   uint32_t every;
   // 1 if the node waits for this member, otherwise 0.

@@ -138,7 +138,7 @@ impl Lockstep {
         report: &mut impl FnMut(Event),
     ) {
         publisher.receive_ready(|message, connection| {
-            // A closed connection may have left a message, but it is no member any more.
+            // A message of a closed connection, which it sent before its end, joins nothing.
             if self.is_member(connection) || publisher.listed_members().contains(&connection) {
                 self.add(message, connection, last, report);
             }

@@ -19,9 +19,6 @@ use kind_filter::kind_or_all;
 /// Default time in which a grabbed particle reaches its target, in seconds: one frame at 60 Hz.
 pub const GRAB_OVER_S_DEFAULT: f32 = 1.0 / 60.0;
 
-/// Longest time of a motion, in seconds.
-pub const OVER_S_MAX: f32 = 3600.0;
-
 /// An action at the boundary before a step. Its JSON form is a flat object with "kind".
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
@@ -328,7 +325,7 @@ impl Action {
     ///
     /// # Errors
     /// There are no points or more than [`crate::MOTION_POINTS_MAX`], a number is not finite, or the times do not ascend
-    /// from 0 to [`OVER_S_MAX`].
+    /// from 0 to [`crate::OVER_S_MAX`].
     pub fn follow(
         object: MovedObject,
         object_index: u32,

@@ -33,15 +33,15 @@ mod tear_cause;
 mod text;
 
 pub use action::{
-    Action, ActionFields, GRAB_OVER_S_DEFAULT, KindFilter, MovedObject, OVER_S_MAX, RestoreContents,
+    Action, ActionFields, GRAB_OVER_S_DEFAULT, KindFilter, MovedObject, RestoreContents,
 };
 pub use collider_shape::{ColliderFields, ColliderShape};
 pub use constraint_kind::ConstraintKind;
 pub use json::hash as json_hash;
 pub use json::non_finite::PlainF32;
 pub use limits::{
-    CLIENT_ID_END, COLLIDERS_MAX, ELEMENTS_MAX, MOTION_POINTS_MAX, SCENE_SIZE_BYTES_MAX,
-    STEP_WORK_MAX,
+    CLIENT_ID_END, COLLIDERS_MAX, ELEMENTS_MAX, MOTION_POINTS_MAX, OVER_S_MAX,
+    SCENE_SIZE_BYTES_MAX, STEP_WORK_MAX,
 };
 pub use method::Method;
 pub use parameter::{OffMeaning, PARAMETERS, Parameter, ParameterInfo, ParameterValue, ValueForm};

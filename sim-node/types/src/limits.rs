@@ -9,6 +9,8 @@ pub const COLLIDERS_MAX: usize = 1 << 16;
 /// seconds for it. A cloth of a million particles with 6 million constraints and 20 substeps needs about
 /// an eighth of it. Beyond it, a single `set` could stop a node for minutes.
 pub const STEP_WORK_MAX: u64 = 1 << 30;
+/// Longest time of a motion, in seconds.
+pub const OVER_S_MAX: f32 = 3600.0;
 /// Most points of all motions of a scene that are on their way. A keyframe has room for as many.
 pub const MOTION_POINTS_MAX: usize = 2048;
 /// End of the ids of clients: ids are below 2^53, so that every reader of JSON has them exactly.

@@ -4,9 +4,8 @@ use std::fmt;
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use crate::action::OVER_S_MAX;
 use crate::json::non_finite::{double, rotation, vector};
-use crate::limits::MOTION_POINTS_MAX;
+use crate::limits::{MOTION_POINTS_MAX, OVER_S_MAX};
 
 /// A point of a motion.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

@@ -16,7 +16,7 @@ pub struct Ready {
     pub run_id: u64,
     /// The node may compute the step after this one: the member has sent its commands for it.
     pub step: u64,
-    /// Distance of the member's turns, in steps, at least 1: a turn is at the first published step that is at least so many steps
+    /// Distance of the member's turns, in steps, at least 1: a turn is at the first published step that is this distance or more
     /// after the last turn.
     pub every: u32,
     /// [`Ready::TAG`] or [`Ready::REPEAT_TAG`]. Anything else is refused.

@@ -80,7 +80,7 @@ pub struct MemberStatus {
     pub client_id: u64,
     /// Last step that the member was ready for; the step of its joining if there is none.
     pub step: u64,
-    /// Distance of the member's turns, in steps: a turn is at the first published step that is at least so many steps
+    /// Distance of the member's turns, in steps: a turn is at the first published step that is this distance or more
     /// after the last turn.
     pub every: u32,
     /// 1 if the node waits for this member, otherwise 0.

@@ -219,7 +219,7 @@ fn a_refused_contact_distance_leaves_the_contacts_as_they_are() {
     for _ in 0..2000 {
         text += "[[particle]]\nposition = [0, 0, 0]\n";
     }
-    // They are too many for every distance, and also for that of the scene, which is allowed.
+    // The pile has too many neighbours at every distance. A scene may have it, but no command may set another distance.
     let mut pile = solver(&text);
     step(&mut pile, 3);
     let mut refusing = pile.clone();
