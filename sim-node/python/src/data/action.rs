@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use sim_contract::{
-    ConstraintKind, GRAB_OVER_S_DEFAULT, KindFilter, MovedObject, PathError, PathPoint, Text, read_scene_file,
+    ConstraintKind, GRAB_OVER_S_DEFAULT, KindFilter, MovedObject, PathError, PathPoint, Text,
+    read_scene_file,
 };
-use sim_solver::scene::is_path;
 use sim_solver::Scene;
+use sim_solver::scene::is_path;
 
 use crate::arguments;
 use crate::convert::{Quaternion, Vector, from_json, parameter_value};
