@@ -69,7 +69,7 @@ pub mod verification;
 
 pub use complete_state::{CompleteState, CompleteStateError, complete_state};
 pub use counted::counted;
-pub use energy::{EnergyRow, RecordedEnergy};
+pub use energy::RecordedEnergy;
 pub use intact_parts::{IntactParts, RepairedBytes, load_rows};
 pub use log::*;
 pub use recorded_scene::{RecordedSceneError, recorded_scene, scene_to_simulate};

@@ -41,9 +41,9 @@ pub use read::read_error::{LogEnd, ReadError};
 pub use read::reader::{LogReader, open_recording};
 pub use rows::{
     AnchorForceRow, BendColumns, ColliderBodyRow, ColliderDetails, ColliderForceRow, ColliderRow,
-    CollidersRow, EventRow, ForcesRow, MeshFile, OutcomeRow, ParametersRow, SceneColliders,
-    ShapeRow, Softness, StatusRow, StepRow, SurfaceRow, TearsRow, TopologyRow, bend_state,
-    constraint_state,
+    CollidersRow, EnergyRow, EventRow, ForcesRow, MeshFile, OutcomeRow, ParametersRow,
+    SceneColliders, ShapeRow, Softness, StatusRow, StepRow, SurfaceRow, TearsRow, TopologyRow,
+    bend_state, constraint_state,
 };
 pub(crate) use run::BENDS_VERSION;
 pub use run::selection::ContentSelection;

@@ -76,9 +76,10 @@ fn extension_warning(path: &Path, expected: &[&str]) -> Option<String> {
     let first = expected.first()?;
     let extension = path.extension().unwrap_or_default();
     let is_known = expected.iter().any(|known| extension.eq_ignore_ascii_case(known));
-    // Stdout, a device and a folder need no extension, or are refused later.
-    let is_file =
-        path != Path::new("-") && std::fs::metadata(path).map_or(true, |found| found.is_file());
+    // Stdout, which may go to a file, a device and a folder need no extension, or are refused later.
+    let is_file = path != Path::new("-")
+        && !path.starts_with("/dev")
+        && std::fs::metadata(path).map_or(true, |found| found.is_file());
     let path = path_text(path);
     (!is_known && is_file).then(|| {
         format!("warning: programs expect a file of this format to end in .{first}, unlike {path}")

@@ -2,8 +2,7 @@
 
 use serde::Deserialize;
 use serde_json::{Map, Value};
-use sim_contract::{Action, ActionFields, PathPoint, PlainF32, Text};
-use sim_solver::MOTION_POINTS_MAX;
+use sim_contract::{Action, ActionFields, MOTION_POINTS_MAX, PathError, PathPoint, PlainF32, Text};
 
 /// A command and the step in which it takes effect.
 #[derive(Debug, Clone, PartialEq)]
@@ -158,7 +157,15 @@ fn actions(fields: &Map<String, Value>) -> Result<Vec<Action>, FieldError> {
             if !points.is_empty() =>
         {
             Action::follow(object, object_index, &path_points(points)?, append).map_err(|error| {
-                invalid("path", &error.to_string(), allowed_values("follow", "path"))
+                match error {
+                    PathError::Length { count } => {
+                        let allowed = format!("1 to {MOTION_POINTS_MAX} points");
+                        invalid("path", &format!("has {count} points"), &allowed)
+                    }
+                    PathError::Point { .. } => {
+                        invalid("path", &error.to_string(), allowed_values("follow", "path"))
+                    }
+                }
             })
         }
         (action, _) => Ok(vec![action]),
@@ -166,10 +173,6 @@ fn actions(fields: &Map<String, Value>) -> Result<Vec<Action>, FieldError> {
 }
 
 fn path_points(points: Vec<Value>) -> Result<Vec<PathPoint>, FieldError> {
-    if points.len() > MOTION_POINTS_MAX {
-        let problem = format!("has {} points", points.len());
-        return Err(invalid("path", &problem, &format!("up to {MOTION_POINTS_MAX} points")));
-    }
     let point = |value: Value| {
         PathPoint::deserialize(&value).map_err(|_| {
             invalid("path", &format!("{value} is invalid"), allowed_values("follow", "path"))
@@ -340,7 +343,7 @@ mod tests {
             })
             .collect();
         assert_eq!(parts, [(5, 4, false), (5, 4, true), (5, 1, true)]);
-        let wrong = line.replace(r#""time":9"#, r#""time":8"#);
+        let wrong = line_with_path(9).replace(r#""time":9"#, r#""time":8"#);
         let error = parse_commands(&wrong, "x").unwrap_err().to_string();
         assert!(error.contains("point 8 of the path: the time 8 is not after 8"), "{error}");
     }
@@ -348,7 +351,7 @@ mod tests {
     #[test]
     fn a_path_of_more_points_than_a_motion_has_is_refused() {
         assert_eq!(parse_commands(&line_with_path(2048), "x").unwrap().len(), 512);
-        let expected = "drag.jsonl:1: path: has 2049 points (allowed: up to 2048 points)";
+        let expected = "drag.jsonl:1: path: has 2049 points (allowed: 1 to 2048 points)";
         assert_eq!(error(&line_with_path(2049)), expected);
     }
 

@@ -1,6 +1,7 @@
 //! The JSON rows of a recording. The schemas in the file are derived from these types.
 
 mod colliders;
+mod energy;
 mod event;
 mod forces;
 mod json;
@@ -13,6 +14,7 @@ mod tears;
 mod topology;
 
 pub use colliders::{ColliderBodyRow, ColliderDetails, ColliderRow, CollidersRow, ShapeRow};
+pub use energy::EnergyRow;
 pub use event::EventRow;
 pub use forces::{AnchorForceRow, ColliderForceRow, ForcesRow};
 pub use outcome::OutcomeRow;

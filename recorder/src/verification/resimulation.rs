@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
 
-use crate::log::{Frame, Message, OutcomeRow, StepRow};
+use crate::log::{EnergyRow, Frame, Message, OutcomeRow, StepRow};
 use sim_contract::{Action, Outcome, ParticleState, RestoreContents};
 use sim_solver::{Applied, Control, EnergyMeter, Keyframe, Scene, Solver};
 
@@ -11,7 +11,6 @@ use super::finding::{SnapshotFinding, StepGap};
 use super::past_states::PastStates;
 use super::side_rows::SideRows;
 use super::state::{compare, has_other_tears};
-use crate::energy::EnergyRow;
 use crate::simulation::apply;
 
 /// The reason why a recording cannot be re-simulated.

@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sim_contract::SnapshotHeader;
 
-use crate::energy::EnergyRow;
+use super::energy::EnergyRow;
 
 /// The header of a recorded snapshot.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]

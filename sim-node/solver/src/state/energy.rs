@@ -34,7 +34,7 @@ impl Energy {
     }
 
     /// The energy of free particles in gravity, without that of constraints. A held particle has the inverse mass 0, and
-    /// is none of them.
+    /// does not count.
     pub fn of_particles(particles: &[Particle], gravity: [f32; 3]) -> Self {
         let gravity = vector(gravity);
         let mut energy = Self::default();

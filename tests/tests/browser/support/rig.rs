@@ -70,8 +70,8 @@ impl Rig {
 
     /// Opens another page of the bridge, which reaches it over a line of this many bytes per second.
     pub(crate) fn tab_over_slow_line(&self, bytes_per_s: u32) -> Tab {
-        let address = self.url.trim_start_matches("http://").trim_end_matches('/');
-        let url = format!("http://{}/", slow_line::start(address.to_owned(), bytes_per_s));
+        let server = self.url.trim_start_matches("http://").trim_end_matches('/');
+        let url = format!("http://{}/", slow_line::start(server.to_owned(), bytes_per_s));
         Tab::open(&self.browser, &address(&url, ""))
     }
 

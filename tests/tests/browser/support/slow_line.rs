@@ -1,4 +1,4 @@
-//! A line that passes only so many bytes per second to a page.
+//! A line to a page with a limit on its bytes per second.
 
 use std::io::{self, Read, Write};
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
@@ -27,7 +27,7 @@ fn clone(stream: &TcpStream) -> TcpStream {
     stream.try_clone().expect("another handle")
 }
 
-/// Passes bytes on until one of the ends closes. With a limit, passes at most so many in a part.
+/// Passes bytes on until one of the ends closes. With a limit, passes at most that number of bytes in a part.
 fn pass(mut from: TcpStream, mut to: TcpStream, part_bytes: Option<u32>) {
     let mut buffer = vec![0; part_bytes.map_or(1 << 16, |bytes| bytes as usize)];
     let passed: io::Result<()> = loop {

@@ -557,8 +557,11 @@ fn a_copy_for_viewers_is_a_recording_with_the_same_content() {
 fn a_copy_of_a_damaged_recording_has_what_is_intact_and_declares_the_rest() {
     let mut file = record(TINY, 200);
     let snapshot_count = recorded(&file).len();
-    let middle = file.len() / 2;
-    file[middle] ^= 1;
+    // At least one of them lies in a chunk, and not in the index behind it.
+    for tenth in [3, 5, 7] {
+        let at = tenth * file.len() / 10;
+        file[at] ^= 1;
+    }
     let folder = Folder::new("damaged");
     let path = folder.0.join("a.mcap");
     fs::write(&path, file).unwrap();
@@ -567,7 +570,11 @@ fn a_copy_of_a_damaged_recording_has_what_is_intact_and_declares_the_rest() {
     parts.bytes().unwrap().read_to_end(&mut repaired).unwrap();
     let copy = written(&repaired, foxglove::write);
     assert_eq!(recorded(&copy), recorded(&repaired));
-    assert!((1..snapshot_count).contains(&recorded(&copy).len()));
+    assert!(
+        (1..snapshot_count).contains(&recorded(&copy).len()),
+        "{} of {snapshot_count}",
+        recorded(&copy).len()
+    );
     let checked = recorder::check_file(Cursor::new(&copy), None, &mut |_, _| {}).unwrap();
     assert_eq!(checked.findings.list(), []);
     let closing = |file: &[u8]| {
