@@ -41,7 +41,8 @@ pub(crate) struct Simulation {
     scene_hash: u64,
     threads: usize,
     has_forces: bool,
-    running: SharedRunning,
+    /// In a box, because it contains values of an alignment that the allocator of Python objects does not have.
+    running: Box<SharedRunning>,
 }
 
 /// The running state. Worker threads do not survive a fork, and two processes must not write the same file, so a
@@ -217,7 +218,7 @@ impl Simulation {
                 SharedRunning::OfProcess(OfProcess::new("recorded simulation", running))
             }
         };
-        Ok(Self { scene, scene_hash, threads, has_forces, running })
+        Ok(Self { scene, scene_hash, threads, has_forces, running: Box::new(running) })
     }
 
     /// Returns the number of elements of which a rejected command has named an unknown one.

@@ -223,4 +223,16 @@ def test_a_member_that_answers_too_late_is_told_so(
             next(steps)
         count, turn = map(int, re.findall(r"in (\d+) of its turns before step (\d+)", str(raised.value))[0])
         assert turn >= newest
-        assert turn == step + (count + 1) * period
+        assert turn == step + count * period
+
+
+def test_a_member_that_answers_too_late_but_before_its_next_turn_is_told_so(start_node: StartNode) -> None:
+    node = start_node("curtain", "--lockstep-timeout", "100ms", "--rate", "240")
+    other = catenary.attach()
+    with node.lockstep(every=480) as steps:
+        step = next(steps).step
+        end = time.monotonic() + DEADLINE
+        while other.latest().step == step:
+            assert time.monotonic() < end
+        with pytest.raises(catenary.Error, match=f"in 1 of its turns before step {step + 480}:"):
+            next(steps)
