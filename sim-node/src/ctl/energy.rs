@@ -1,11 +1,12 @@
 //! The energy of the newest state, for `ctl status --energy`.
 
 use std::str;
-use std::time::Instant;
+use std::time::Duration;
 
 use anyhow::{Context, bail};
 use bytemuck::cast_slice;
 use serde::Serialize;
+use sim_contract::clock::monotonic_ns;
 use sim_contract::{State, Tap};
 use sim_solver::{Energy, EnergyMeter, Scene};
 
@@ -24,12 +25,13 @@ impl EnergyRow {
     /// Measures the newest state of the node.
     pub(super) fn read(args: &CtlArgs) -> anyhow::Result<Self> {
         let mut tap = Tap::attach(&args.endpoint.endpoint()?)?;
-        let deadline = Instant::now() + args.timeout();
+        let begin_ns = monotonic_ns();
         loop {
             if let Some(state) = tap.next_state(|_| {}) {
                 return Self::of(&state);
             }
-            let left = deadline.saturating_duration_since(Instant::now());
+            let passed = Duration::from_nanos(monotonic_ns() - begin_ns);
+            let left = args.timeout().saturating_sub(passed);
             if left.is_zero() {
                 bail!("the node published no state within {:?}; is it stopped?", args.timeout());
             }

@@ -52,7 +52,7 @@ fn a_large_scene_arrives_over_a_slow_line_and_the_page_says_how_far() {
     // 1 Mbit/s.
     let page = rig.tab_over_slow_line(125_000);
     page.evaluate(
-        "window.texts = new Set(); new MutationObserver(() => texts.add(viewer.banner.text)).observe(document.querySelector('#banner'), { childList: true, characterData: true, subtree: true })",
+        "window.texts = new Set(); new MutationObserver(() => texts.add(viewer.banner)).observe(document.querySelector('#banner'), { childList: true, characterData: true, subtree: true })",
     );
     page.wait("viewer.scene === 'scene' && viewer.frame >= 0");
     let texts = page.evaluate("[...texts]");

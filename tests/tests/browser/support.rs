@@ -5,7 +5,6 @@ mod chromium;
 mod picture;
 mod replay;
 mod rig;
-mod slow_line;
 mod tab;
 
 pub(crate) use camera::{Camera, distance};

@@ -106,7 +106,7 @@ fn a_bend_stores_its_rigidity_times_the_square_of_its_curvature() {
 fn a_hinge_that_is_folded_at_rest_stores_nothing() {
     let points = ["[0, 1, 0.3]", "[0, 0, 0]", "[1, 0, 0]", "[0.5, -1, 0.2]"];
     let folded = |rest: &str| {
-        let vertices: String = points.iter().map(|point| format!("{point}, ")).collect();
+        let vertices = points.join(", ");
         let text = format!(
             "gravity = [0, 0, 0]\n[[generate]]\nshape = \"obj\"\nvertices = [{vertices}]\n\
              faces = [[0, 1, 2], [1, 3, 2]]\nbending = 0.1\nrest = \"{rest}\"\n"

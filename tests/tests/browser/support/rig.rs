@@ -7,7 +7,6 @@ use integration_tests::{DEADLINE, Process, Program, Sandbox, ctl, wait_for};
 use sim_contract::{Client, ParticleState};
 
 use super::chromium::BrowserLock;
-use super::slow_line;
 use super::tab::Tab;
 
 pub(super) const ANY_PORT: &str = "127.0.0.1:0";
@@ -68,11 +67,9 @@ impl Rig {
         Tab::open(&self.browser, &address(&self.url, fragment))
     }
 
-    /// Opens another page of the bridge, which reaches it over a line of this many bytes per second.
+    /// Opens another page of the bridge, which receives at most this number of bytes per second.
     pub(crate) fn tab_over_slow_line(&self, bytes_per_s: u32) -> Tab {
-        let server = self.url.trim_start_matches("http://").trim_end_matches('/');
-        let url = format!("http://{}/", slow_line::start(server.to_owned(), bytes_per_s));
-        Tab::open(&self.browser, &address(&url, ""))
+        Tab::open_slowly(&self.browser, &address(&self.url, ""), bytes_per_s)
     }
 
     /// Opens another page of the bridge, at a path.

@@ -67,6 +67,18 @@ impl Tab {
         tab
     }
 
+    /// Opens a page over a line of this many bytes per second, and does not wait for its scene.
+    pub(crate) fn open_slowly(browser: &Rc<BrowserLock>, url: &str, bytes_per_s: u32) -> Self {
+        let tab = Self::blank(browser);
+        tab.call("Network.enable", json!({}));
+        let line = json!({ "offline": false, "latency": 0, "downloadThroughput": bytes_per_s,
+            "uploadThroughput": -1 });
+        tab.call("Network.emulateNetworkConditions", line);
+        tab.call("Page.navigate", json!({ "url": url }));
+        tab.wait("window.viewer !== undefined");
+        tab
+    }
+
     fn blank(browser: &Rc<BrowserLock>) -> Self {
         let text = |answer: Value, field: &str| answer[field].as_str().unwrap().to_owned();
         let call = |method: &str, params: Value| browser.call(None, method, params).unwrap();
