@@ -81,24 +81,24 @@ pub struct SceneState {
     pub parameters: Option<ParameterValues>,
 }
 
-/// Reads a recording and calls `visit` with its state at each recorded step of `steps`, which ascend, until
-/// `visit` breaks. `0..` are all steps.
+/// Reads a recording and calls `visit` with its state at each of `steps`, which ascend, or at each recorded
+/// step, until `visit` breaks.
 ///
 /// # Errors
 /// The file cannot be read, its messages contradict each other, or `visit` fails.
 pub fn visit_states<R: Read, E: From<SceneStateError>>(
     log: LogReader<R>,
-    steps: impl IntoIterator<Item = u64>,
+    steps: Option<&[u64]>,
     mut visit: impl FnMut(&SceneState) -> Result<ControlFlow<()>, E>,
 ) -> Result<(), E> {
-    let mut steps = steps.into_iter().peekable();
-    let first_step = steps.peek().copied().unwrap_or_default();
+    let first_step = steps.and_then(|steps| steps.first().copied()).unwrap_or_default();
+    let mut steps = steps.map(|steps| steps.iter().copied().peekable());
     let mut frames = FrameReader::new(log);
     let mut state = SceneState::default();
     let mut tears = TearTracker::new(Torn::default());
     // Those of later steps may arrive early.
     let mut parameters: VecDeque<ParametersRow> = VecDeque::new();
-    while steps.peek().is_some() {
+    while steps.as_mut().is_none_or(|steps| steps.peek().is_some()) {
         let Some(frame) = frames.next_frame().map_err(SceneStateError::from)? else { break };
         for message in &frame.updates {
             if let Message::Parameters(row) = message {
@@ -111,8 +111,8 @@ pub fn visit_states<R: Read, E: From<SceneStateError>>(
         }
         state.read_meshes(frames.log());
         state.outcomes.retain(|row| row.step >= first_step);
-        while steps.next_if(|step| *step < state.row.step).is_some() {}
-        if steps.next_if_eq(&state.row.step).is_some() {
+        let step = state.row.step;
+        if steps.as_mut().is_none_or(|steps| steps.next_if_eq(&step).is_some()) {
             state.set_torn(tears.at(state.row.step).iter().flat_map(|torn| torn.indices()))?;
             state.check_indices()?;
             if visit(&state)?.is_break() {

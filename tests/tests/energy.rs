@@ -127,7 +127,7 @@ fn the_energy_of_a_recording_without_it_is_measured() {
         [&with, &without].map(|file| recorder(&sandbox, &["export", file, "--energy", "-"]));
     assert_eq!(tables[0], tables[1]);
     let mut lines = tables[0].lines();
-    assert_eq!(lines.next(), Some("step,time_s,kinetic_j,potential_j,elastic_j,total_j"));
+    assert_eq!(lines.next(), Some("step,time_s,kinetic,potential,elastic,total"));
     for (line, (step, energy)) in lines.zip(recorded(&with)) {
         let EnergyRow { kinetic, potential, elastic } = energy.unwrap();
         let total = kinetic + potential + elastic;
@@ -146,5 +146,26 @@ fn the_energy_of_a_recording_without_it_is_measured() {
     );
     assert!(reports[0]["total_min"].as_f64() < reports[0]["total_max"].as_f64());
     let text = recorder(&sandbox, &["info", &with, "--energy"]);
-    assert!(text.starts_with("energy in J") && text.contains("step 60"), "{text}");
+    assert!(text.starts_with("in J ") && text.contains("step 60"), "{text}");
+}
+
+#[test]
+fn the_energy_of_a_part_of_a_run_is_the_recorded_one_or_refused_with_the_missing_topic() {
+    let sandbox = Sandbox::new();
+    let (commands, excluded) = (sandbox.path("commands.mcap"), sandbox.path("excluded.mcap"));
+    let node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain", "--paused"]);
+    for (file, options) in
+        [(&commands, &["--only-commands", "--energy"][..]), (&excluded, &["--exclude", "tears"])]
+    {
+        let args = [&["record", "-o", file, "--steps", "30"], options].concat();
+        let recording = Process::start_ready(Program::Recorder, &sandbox, &args);
+        ctl(&sandbox, &["step", "30"]);
+        recording.wait().success();
+    }
+    node.interrupt().success();
+    let text = recorder(&sandbox, &["info", &commands, "--energy"]);
+    assert!(text.contains("step 30"), "{text}");
+    let refused = Process::run(Program::Recorder, &sandbox, &["info", &excluded, "--energy"]);
+    assert_eq!(refused.code, Some(1), "{refused:?}");
+    assert!(refused.stderr.contains("leaves out /tears on purpose"), "{}", refused.stderr);
 }

@@ -59,7 +59,7 @@ const FRAMES_PER_S_DEFAULT: u16 = 25;
     snapshot.\n\n\
     Coordinates are those of the recording, in m, relative to the origin of the scene: no format \
     turns the scene.\n\n\
-    `-` as the FILE of --apng, --npz, --csv, --usda and --foxglove is stdout. The line about the result is then on \
+    `-` as the FILE of --apng, --npz, --csv, --energy, --usda and --foxglove is stdout. The line about the result is then on \
     stderr.\n\n\
     Exit codes: 0 exported; 1 failed; 3 the file is truncated or damaged, and what is intact was \
     exported, if anything is.\n\nExamples:\n  \
@@ -209,14 +209,13 @@ fn export<R: Read>(
         let bar = progress_bar(steps.len() as u64);
         // Only errors of reading get the name of the recording.
         let mut refused = None;
-        let visited: Result<(), SceneStateError> =
-            visit_states(open()?, steps.iter().copied(), |state| {
-                bar.inc(1);
-                visitor(state).or_else(|error| {
-                    refused = Some(error);
-                    Ok(ControlFlow::Break(()))
-                })
-            });
+        let visited: Result<(), SceneStateError> = visit_states(open()?, Some(steps), |state| {
+            bar.inc(1);
+            visitor(state).or_else(|error| {
+                refused = Some(error);
+                Ok(ControlFlow::Break(()))
+            })
+        });
         bar.finish_and_clear();
         visited.with_context(|| output::path_text(&args.file))?;
         refused.map_or(Ok(()), Err)

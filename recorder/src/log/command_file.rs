@@ -2,7 +2,9 @@
 
 use serde::Deserialize;
 use serde_json::{Map, Value};
-use sim_contract::{Action, ActionFields, MOTION_POINTS_MAX, PathError, PathPoint, PlainF32, Text};
+use sim_contract::{
+    Action, ActionFields, MOTION_POINTS_MAX, PathError, PathPart, PathPoint, PlainF32, Text,
+};
 
 /// A command and the step in which it takes effect.
 #[derive(Debug, Clone, PartialEq)]
@@ -107,8 +109,11 @@ fn parse_line(text: &str, number: u64) -> Result<Vec<TimedCommand>, FieldError> 
     let index = integer(&fields, "index", 0)?;
     let client_id = integer(&fields, "client_id", 0)?.unwrap_or(0);
     let first = integer(&fields, "sequence", 0)?.unwrap_or(number);
-    let command = |(sequence, action)| TimedCommand { step, index, client_id, sequence, action };
-    Ok((first..).zip(actions(&fields)?).map(command).collect())
+    let command = |(part, action)| {
+        let sequence = first.wrapping_add(part);
+        TimedCommand { step, index, client_id, sequence, action }
+    };
+    Ok((0..).zip(actions(&fields)?).map(command).collect())
 }
 
 fn actions(fields: &Map<String, Value>) -> Result<Vec<Action>, FieldError> {
@@ -156,15 +161,18 @@ fn actions(fields: &Map<String, Value>) -> Result<Vec<Action>, FieldError> {
         (Action::Follow { object, object_index, append, .. }, Some(Value::Array(points)))
             if !points.is_empty() =>
         {
-            Action::follow(object, object_index, &path_points(points)?, append).map_err(|error| {
-                match error {
-                    PathError::Length { count } => {
-                        let allowed = format!("1 to {MOTION_POINTS_MAX} points");
-                        invalid("path", &format!("has {count} points"), &allowed)
-                    }
-                    PathError::Point { .. } => {
-                        invalid("path", &error.to_string(), allowed_values("follow", "path"))
-                    }
+            let points = path_points(points)?;
+            // A single command may be one that the node has rejected.
+            if let Some(path) = PathPart::new(&points) {
+                return Ok(vec![Action::Follow { object, object_index, path, append }]);
+            }
+            Action::follow(object, object_index, &points, append).map_err(|error| match error {
+                PathError::Length { count } => {
+                    let allowed = format!("1 to {MOTION_POINTS_MAX} points");
+                    invalid("path", &format!("has {count} points"), &allowed)
+                }
+                PathError::Point { .. } => {
+                    invalid("path", &error.to_string(), allowed_values("follow", "path"))
                 }
             })
         }

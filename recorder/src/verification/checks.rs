@@ -170,9 +170,23 @@ impl Verification {
         stop: &AtomicBool,
     ) -> Result<Option<SnapshotFinding>, ResimulationError> {
         match self.check_content(frame, frozen) {
-            SnapshotFinding::Identical => self.check_state(frame, stop),
+            SnapshotFinding::Identical => {
+                let finding = self.check_state(frame, stop)?;
+                Ok(finding.map(|finding| self.check_energy(finding, frame)))
+            }
             finding => Ok(Some(finding)),
         }
+    }
+
+    /// Refuses an identical snapshot without the energy that the file declares.
+    fn check_energy(&self, finding: SnapshotFinding, frame: &Frame) -> SnapshotFinding {
+        let lacks_energy = self.has_energy && frame.row.energy.is_none();
+        if lacks_energy && finding == SnapshotFinding::Identical {
+            let what =
+                "its row in /steps lacks the energy, which the metadata 'selection' declares";
+            return SnapshotFinding::at_step(frame.row.step, what.to_owned());
+        }
+        finding
     }
 
     /// Compares the form of the messages, the load and the events.
@@ -198,8 +212,9 @@ impl Verification {
         if let Some(finding) = self.check_rows(frame) {
             return finding;
         }
-        if frame.row.energy.is_some() != self.has_energy {
-            let what = "the metadata 'selection' and its row in /steps differ in whether energy was recorded";
+        if frame.row.energy.is_some() && !self.has_energy {
+            let what =
+                "its row in /steps has an energy, which the metadata 'selection' does not declare";
             return diverged(what.to_owned());
         }
         let what = self.numbers.check(&frame.row);

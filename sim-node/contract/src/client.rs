@@ -408,10 +408,8 @@ impl Client {
         })?;
         if let Some(snapshot) = &snapshot {
             // A status that names a member dropped in its turn precedes the next snapshot.
-            let status = match &mut self.status {
-                Some(reader) => reader.receive()?,
-                None => None,
-            };
+            // One that cannot be read does not take the turn.
+            let status = self.status.as_mut().and_then(|reader| reader.receive().ok().flatten());
             member.begin_turn(snapshot.header(), status);
         }
         Ok(snapshot)

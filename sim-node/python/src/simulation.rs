@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
 use numpy::{PyArray1, PyArray2, PyArray3};
-use pyo3::exceptions::PyTypeError;
+use pyo3::exceptions::{PyMemoryError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use recorder::simulation::{SteppedRecording, apply, colliders_row, forces_row};
@@ -190,6 +190,7 @@ impl Simulation {
         has_forces: bool,
         record: Option<(&Path, Existing)>,
     ) -> PyResult<Self> {
+        scene.check_memory().map_err(|error| PyMemoryError::new_err(error.to_string()))?;
         let mut solver = Solver::new(&scene);
         solver.compute_forces(has_forces);
         solver.set_threads(threads);

@@ -218,8 +218,8 @@ impl Solver {
     ///
     /// # Errors
     /// The parameter is unknown, the value has another form or is out of range, or the softness
-    /// belongs to the other method. A contact distance is out of range if at load it has more neighbours than
-    /// the solver can keep apart, of which a scene with this distance is warned, too.
+    /// belongs to the other method. A contact distance is out of range if it has too many neighbours
+    /// at load; `check` warns of a scene with such a distance.
     pub fn set(
         &mut self,
         name: &str,

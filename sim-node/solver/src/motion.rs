@@ -85,15 +85,20 @@ impl Motion {
         Self { start_step: scene_step, points: points.collect() }
     }
 
-    /// The same motion with further points. None if the first of them is not after the last point.
+    /// The same motion with further points. After its end, it goes on from now: a frame that stands does not jump. None if
+    /// the first of the points is not after the last one of the motion, or not after now.
     pub(crate) fn extended(&self, scene_step: u64, points: &[(f64, Frame)]) -> Option<Self> {
-        let pending = self.pending(scene_step);
-        let last = pending.last().map_or(0.0, |last| last.time);
-        if points.first().is_some_and(|(time, _)| *time <= last) {
+        let (pending, now) = (self.pending(scene_step), self.elapsed(scene_step));
+        let last = pending.last()?;
+        if points.first().is_some_and(|(time, _)| *time <= last.time.max(now)) {
             return None;
         }
         let added = points.iter().map(|(time, frame)| waypoint(*time, *frame));
-        let points = pending.iter().copied().chain(added).collect();
+        let points = if last.time < now {
+            std::iter::once(Waypoint { time: now, ..*last }).chain(added).collect()
+        } else {
+            pending.iter().copied().chain(added).collect()
+        };
         Some(Self { start_step: self.start_step, points })
     }
 
@@ -119,7 +124,7 @@ impl Motion {
         (self.frame_after(aim).translation, steps)
     }
 
-    /// Number of points on their way, the last one that was passed included: one after the end of the motion.
+    /// Number of points on their way, including the last point passed; 1 after the motion has ended.
     pub(crate) fn point_count(&self, scene_step: u64) -> usize {
         self.pending(scene_step).len()
     }

@@ -287,7 +287,8 @@ impl Solver {
         }
     }
 
-    /// Derives the contacts for a distance, or takes those over that were offered. None if the current ones have it.
+    /// Returns the contacts for a distance: the offered ones, or else new ones. `None` if the current contacts have this
+    /// distance.
     pub(crate) fn contacts_at(&mut self, thickness: Option<f32>) -> Option<ParticleContacts> {
         if self.particle_contacts.are_derived_from(thickness) {
             return None;
@@ -299,7 +300,8 @@ impl Solver {
         }))
     }
 
-    /// Like [`Self::contacts_at`], for a distance that a client sets. None also for that of the scene, which may be larger.
+    /// Like [`Self::contacts_at`], for a distance that a client sets. The scene's own distance is always allowed, even with
+    /// too many neighbours: returns `None` for it.
     ///
     /// # Errors
     /// More neighbours are near each other at load than the lists of pairs that never touch have room for.

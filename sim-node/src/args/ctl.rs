@@ -88,8 +88,7 @@ pub(crate) enum QueryVerb {
         after_help = "Examples:\n  sim-node ctl status\n  sim-node ctl status --energy --json"
     )]
     Status {
-        /// Print the energy of the newest state, too: kinetic, potential (-m g.x) and elastic, in J if the scene is in
-        /// metres, of the free particles and of the constraints and bends that are not torn
+        /// Print the energy of the newest state, too: kinetic, potential (-m g.x) and elastic, of the free particles and of the constraints and bends that are not torn
         #[arg(long)]
         energy: bool,
     },

@@ -259,7 +259,7 @@ mod tests {
             ("0 1 2 3\n\n0 1 2 3", "csv:3: the time 0 is not after 0 (allowed: ascending times)"),
             ("1 1 2", "csv:1: 3 numbers (allowed: 4, its time in s and x, y, z; or 8,"),
             ("1 1 2 x", "csv:1: 'x' is not a number"),
-            ("1 1 2 nan", "csv:1: a number is not finite"),
+            ("1 1 2 nan", "csv:1: a number is not finite in 32 bits"),
             ("3601 1 2 3", "csv:1: the time 3601 is out of range (allowed: 0 to 3600 s)"),
             ("# nothing", "csv: a path of 0 points (allowed: 1 to 2048)"),
         ] {

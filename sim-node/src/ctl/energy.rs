@@ -12,13 +12,15 @@ use sim_solver::{Energy, EnergyMeter, Scene};
 
 use crate::args::CtlArgs;
 
-/// The energy of a state in JSON, in J.
+/// The energy of a state in JSON.
 #[derive(Debug, Serialize)]
 pub(super) struct EnergyRow {
     /// The step of the state.
     step: u64,
     #[serde(flatten)]
     energy: Energy,
+    /// "J", or the unit that follows from that of the scene.
+    unit: String,
 }
 
 impl EnergyRow {
@@ -45,16 +47,16 @@ impl EnergyRow {
         let (particles, values) = (cast_slice(state.particles), &state.parameters.values);
         let energy = EnergyMeter::new(&scene).measure(particles, state.torn.indices(), values);
         let energy = energy.context("the newest state is not one of the scene of the node")?;
-        Ok(Self { step: state.header.step, energy })
+        Ok(Self { step: state.header.step, energy, unit: scene.energy_unit() })
     }
 
     /// Text for people.
     pub(super) fn text(&self) -> String {
-        let Self { step, energy } = self;
+        let Self { step, energy, unit } = self;
         let Energy { kinetic, potential, elastic } = energy;
         let total = energy.total();
         format!(
-            "{total:.6} J in step {step}: {kinetic:.6} kinetic, {potential:.6} potential, {elastic:.6} elastic"
+            "{total:.6} {unit} in step {step}: {kinetic:.6} kinetic, {potential:.6} potential, {elastic:.6} elastic"
         )
     }
 }

@@ -10,6 +10,8 @@ use sim_solver::{Blocks, Chain, Keyframe, Particle, Solver};
 /// Most rewinds to remember. Beyond it the oldest rewinds are forgotten, and steps back across them are counted as if they
 /// had not happened.
 const BRANCHES_MAX: usize = 4096;
+/// Most states. To thin more of them would take milliseconds of the loop.
+const STATES_MAX: usize = 1 << 17;
 
 /// The list of the states takes at least 1/16 of the memory, because a load may bring a scene with smaller states.
 const LIST_PART: usize = 16;
@@ -31,6 +33,8 @@ pub(super) struct History {
     /// By ascending step.
     branches: VecDeque<Branch>,
     newest: Option<Newest>,
+    /// States are asked for, and at least one of the scene fits.
+    is_on: bool,
 }
 
 /// A kept state.
@@ -89,6 +93,7 @@ impl History {
                 .context(PROBLEM)?,
             branches: VecDeque::with_capacity(BRANCHES_MAX),
             newest: None,
+            is_on: false,
         };
         history.restart(solver);
         Ok(history)
@@ -100,6 +105,7 @@ impl History {
         self.newest = None;
         self.branches.clear();
         self.blocks.divide(solver.particle_count());
+        self.is_on = self.count_max > 0 && self.has_room(solver);
     }
 
     /// Returns `true` if at least the state of one step fits, or none is asked for. Call it before one is kept.
@@ -117,7 +123,7 @@ impl History {
 
     /// Keeps the state after a step. `is_commanded` is true if a command was applied before it.
     pub(super) fn keep(&mut self, step: u64, solver: &Solver, is_commanded: bool) {
-        if self.count_max == 0 {
+        if !self.is_on {
             return;
         }
         let (torn_count, frozen_count) = (solver.torn().len(), solver.frozen_count());
@@ -262,7 +268,8 @@ impl History {
 fn longest_list(limit_bytes: usize, particle_count: usize) -> usize {
     let state_size_bytes = particle_count.max(PARTICLES_MIN) * size_of::<Particle>();
     let count = limit_bytes / (ENTRY_SIZE_BYTES + state_size_bytes);
-    count.max(limit_bytes / LIST_PART / ENTRY_SIZE_BYTES).max(limit_bytes.min(1))
+    let count = count.max(limit_bytes / LIST_PART / ENTRY_SIZE_BYTES);
+    count.clamp(limit_bytes.min(1), STATES_MAX)
 }
 
 #[cfg(test)]

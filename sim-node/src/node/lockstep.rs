@@ -67,7 +67,11 @@ pub(super) struct Published {
 
 impl Published {
     pub(super) fn new(publisher: &Publisher, step: u64) -> Self {
-        Self { run_id: publisher.run_id(), step, is_in_place: publisher.is_in_place(step) }
+        Self {
+            run_id: publisher.run_id(),
+            step,
+            is_in_place: publisher.has_published_in_place(step),
+        }
     }
 }
 

@@ -173,6 +173,11 @@ impl Publisher {
         step > 0 && step == self.in_place_step
     }
 
+    /// Returns `true` if the newest published snapshot is that of a step, and says that a command has put its state in place.
+    pub(crate) fn has_published_in_place(&self, step: u64) -> bool {
+        self.has_published(step) && self.last.flags & SnapshotFlags::IN_PLACE != 0
+    }
+
     /// Identifies the scene.
     pub(crate) fn scene_hash(&self) -> u64 {
         self.scene_hash

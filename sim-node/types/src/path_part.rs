@@ -90,7 +90,7 @@ impl fmt::Display for PointFault {
                 formatter,
                 "{count} numbers (allowed: 4, its time in s and x, y, z; or 8, a quaternion x, y, z, w behind these)"
             ),
-            Self::NotFinite => write!(formatter, "a number is not finite"),
+            Self::NotFinite => write!(formatter, "a number is not finite in 32 bits"),
             Self::Time { time } => {
                 write!(formatter, "the time {time} is out of range (allowed: 0 to {OVER_S_MAX} s)")
             }
@@ -223,9 +223,12 @@ mod tests {
         for (points, expected) in [
             (vec![], "a path of 0 points (allowed: 1 to 2048)"),
             (vec![point(0.0); 2049], "a path of 2049 points (allowed: 1 to 2048)"),
-            (vec![point(0.0), point(f64::NAN)], "point 1 of the path: a number is not finite"),
-            (vec![far], "point 0 of the path: a number is not finite"),
-            (vec![point(0.5), turned], "point 1 of the path: a number is not finite"),
+            (
+                vec![point(0.0), point(f64::NAN)],
+                "point 1 of the path: a number is not finite in 32 bits",
+            ),
+            (vec![far], "point 0 of the path: a number is not finite in 32 bits"),
+            (vec![point(0.5), turned], "point 1 of the path: a number is not finite in 32 bits"),
             (
                 vec![point(0.0), point(1.0), point(1.0)],
                 "point 2 of the path: the time 1 is not after 1 (allowed: ascending times)",

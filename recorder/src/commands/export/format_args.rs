@@ -26,7 +26,8 @@ pub(super) struct FormatArgs {
     /// Write a table with a row for each particle of each snapshot
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
-    /// Write a table of CSV with the energy of each snapshot in J: kinetic, potential, elastic and their sum; `-` is stdout
+    /// Write a table with the energy of each snapshot: kinetic, potential, elastic and their sum, in J if the scene is in
+    /// metres
     #[arg(long, value_name = "FILE")]
     energy: Option<PathBuf>,
     /// Write VTP files and a PVD file with their times into this folder, for ParaView: velocity,

@@ -6,13 +6,24 @@ use std::ops::ControlFlow;
 
 use anyhow::Context;
 use recorder::{
-    EnergyRow, LogReader, RecordedEnergy, SceneState, SceneStateError, recorded_scene, visit_states,
+    ContentSelection, EnergyRow, FrameReader, LogReader, RecordedEnergy, SceneState,
+    SceneStateError, recorded_scene, visit_states,
 };
 use serde::Serialize;
+use sim_solver::Scene;
 
 /// The energy at the ends of a recording, and the limits of its sum.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Serialize)]
 pub(super) struct EnergyReport {
+    /// "J", or the unit that follows from that of the scene.
+    unit: String,
+    #[serde(flatten)]
+    range: EnergyRange,
+}
+
+/// The energy at the ends, and the limits of its sum.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+struct EnergyRange {
     first: StepEnergy,
     last: StepEnergy,
     /// The smallest and the largest sum.
@@ -20,7 +31,7 @@ pub(super) struct EnergyReport {
     total_max: f64,
 }
 
-/// The energy of the state of a step, in J.
+/// The energy of the state of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 struct StepEnergy {
     step: u64,
@@ -30,30 +41,56 @@ struct StepEnergy {
 }
 
 impl EnergyReport {
-    /// Reads or measures the energy of each snapshot.
+    /// Reads the energy of each snapshot, or measures it if it was not recorded.
     pub(super) fn read<R: Read>(log: LogReader<R>) -> anyhow::Result<Self> {
-        let mut measured = RecordedEnergy::new(&recorded_scene(&log)?);
-        let mut report: Option<Self> = None;
-        visit_states(log, 0.., |state: &SceneState| {
-            if let Some(energy) = measured.of(state) {
-                let (step, total) = (state.row.step, energy.total());
-                let last = StepEnergy { step, energy, total };
-                let before = report.unwrap_or(Self {
-                    first: last,
-                    last,
-                    total_min: total,
-                    total_max: total,
-                });
-                report = Some(Self {
-                    last,
-                    total_min: before.total_min.min(total),
-                    total_max: before.total_max.max(total),
-                    ..before
-                });
-            }
-            Ok::<_, SceneStateError>(ControlFlow::Continue(()))
-        })?;
-        report.context("no snapshot has an energy: parameters or particles were not recorded")
+        let scene = recorded_scene(&log)?;
+        let unit = scene.energy_unit();
+        let range =
+            if log.selection().has_energy() { recorded(log)? } else { measured(log, &scene)? };
+        Ok(Self { unit, range: range.context("no snapshot has an energy")? })
+    }
+}
+
+fn recorded<R: Read>(log: LogReader<R>) -> anyhow::Result<Option<EnergyRange>> {
+    let mut frames = FrameReader::new(log);
+    let mut range = None;
+    while let Some(frame) = frames.next_frame()? {
+        if let Some(energy) = frame.row.energy {
+            range = Some(EnergyRange::with(range, frame.row.step, energy));
+        }
+    }
+    Ok(range)
+}
+
+fn measured<R: Read>(log: LogReader<R>, scene: &Scene) -> anyhow::Result<Option<EnergyRange>> {
+    const PURPOSE: &str = "`recorder info --energy`";
+    let selection = log.selection();
+    selection.require(&ContentSelection::FOR_ENERGY, PURPOSE)?;
+    selection.require_all_particles(PURPOSE)?;
+    let mut measured = RecordedEnergy::new(scene);
+    let mut range = None;
+    visit_states(log, None, |state: &SceneState| {
+        if let Some(energy) = measured.of(state) {
+            range = Some(EnergyRange::with(range, state.row.step, energy));
+        }
+        Ok::<_, SceneStateError>(ControlFlow::Continue(()))
+    })?;
+    Ok(range)
+}
+
+impl EnergyRange {
+    /// Adds the next step.
+    fn with(before: Option<Self>, step: u64, energy: EnergyRow) -> Self {
+        let total = energy.total();
+        let last = StepEnergy { step, energy, total };
+        let before =
+            before.unwrap_or(Self { first: last, last, total_min: total, total_max: total });
+        Self {
+            last,
+            total_min: before.total_min.min(total),
+            total_max: before.total_max.max(total),
+            ..before
+        }
     }
 }
 
@@ -62,10 +99,14 @@ impl fmt::Display for EnergyReport {
         writeln!(
             f,
             "{:<12}{:>14} {:>14} {:>14} {:>14}",
-            "energy in J", "kinetic", "potential", "elastic", "total"
+            format!("in {}", self.unit),
+            "kinetic",
+            "potential",
+            "elastic",
+            "total"
         )?;
         for StepEnergy { step, energy: EnergyRow { kinetic, potential, elastic }, total } in
-            [self.first, self.last]
+            [self.range.first, self.range.last]
         {
             let name = format!("step {step}");
             writeln!(
@@ -73,6 +114,7 @@ impl fmt::Display for EnergyReport {
                 "{name:<12}{kinetic:>14.6} {potential:>14.6} {elastic:>14.6} {total:>14.6}"
             )?;
         }
-        write!(f, "{:<12}{:.6} to {:.6}", "total", self.total_min, self.total_max)
+        let EnergyRange { total_min, total_max, .. } = self.range;
+        write!(f, "{:<12}{total_min:.6} to {total_max:.6}", "total")
     }
 }

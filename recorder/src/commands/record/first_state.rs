@@ -75,7 +75,7 @@ impl FirstState {
 }
 
 /// Returns `true` if everything that belongs to a state, except its keyframe, has arrived.
-pub(crate) fn has_all_parts(state: &State<'_>) -> bool {
+fn has_all_parts(state: &State<'_>) -> bool {
     let State { header, torn, colliders, parameters, .. } = *state;
     torn.constraints.len() == header.torn_count as usize
         && torn.header.run_id == header.run_id

@@ -9,7 +9,7 @@ use sim_contract::{
 use sim_solver::EnergyMeter;
 
 use super::accepted::{Accepted, RunEnd};
-use super::first_state::{FirstState, has_all_parts};
+use super::first_state::FirstState;
 use super::load::{Load, LoadError, Now};
 use super::messages::Messages;
 use started::{Passed, PreviousFile, Started};
@@ -57,9 +57,13 @@ pub(crate) struct Intake {
     meter: Option<EnergyMeter>,
 }
 
-/// Returns the energy of a state, if it was asked for. A state that lacks a part of it has none.
+/// Returns the energy of a state, if it was asked for. A state whose tears or parameters have not arrived has none.
 fn measure(meter: &mut Option<EnergyMeter>, state: &State<'_>) -> Option<EnergyRow> {
-    if !has_all_parts(state) {
+    let State { header, torn, parameters, .. } = *state;
+    let has_parts = torn.header.run_id == header.run_id
+        && torn.constraints.len() == header.torn_count as usize
+        && parameters.header.run_id == header.run_id;
+    if !has_parts {
         return None;
     }
     let (particles, torn) = (bytemuck::cast_slice(state.particles), state.torn.indices());

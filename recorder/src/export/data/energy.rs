@@ -7,7 +7,7 @@ use recorder::{EnergyRow, RecordedEnergy};
 
 use crate::export::snapshots::Snapshots;
 
-const COLUMNS: &str = "step,time_s,kinetic_j,potential_j,elastic_j,total_j";
+const COLUMNS: &str = "step,time_s,kinetic,potential,elastic,total";
 
 /// Writes the table. Numbers have as many digits as their bits need, so reading gives the same bits.
 pub(crate) fn write(snapshots: &Snapshots<'_>, out: &mut dyn Write) -> anyhow::Result<()> {

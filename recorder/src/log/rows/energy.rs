@@ -18,18 +18,12 @@ pub struct EnergyRow {
 impl EnergyRow {
     /// Returns the sum.
     pub fn total(&self) -> f64 {
-        Energy::from(*self).total()
+        self.kinetic + self.potential + self.elastic
     }
 }
 
 impl From<Energy> for EnergyRow {
     fn from(Energy { kinetic, potential, elastic }: Energy) -> Self {
-        Self { kinetic, potential, elastic }
-    }
-}
-
-impl From<EnergyRow> for Energy {
-    fn from(EnergyRow { kinetic, potential, elastic }: EnergyRow) -> Self {
         Self { kinetic, potential, elastic }
     }
 }

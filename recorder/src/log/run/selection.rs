@@ -53,6 +53,8 @@ impl ContentSelection {
 
     /// The topics that a picture of any step needs.
     pub const FOR_PICTURES: [Topic; 3] = [Topic::Colliders, Topic::Tears, Topic::Particles];
+    /// The topics that the energy of any step needs.
+    pub const FOR_ENERGY: [Topic; 3] = [Topic::Tears, Topic::Parameters, Topic::Particles];
     /// The topics that a proof, a replay and a restored state need.
     pub const FOR_STATES: [Topic; 6] = [
         Topic::Colliders,

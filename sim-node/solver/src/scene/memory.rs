@@ -6,9 +6,10 @@ use super::definition::Scene;
 use super::definition::contact::ContactMode;
 use super::generate::Shape;
 
-/// Memory of a solver for each element, in bytes, as measured at a million particles. It bounds nothing: it is for a
-/// sentence in the place of the end of the process.
-/// With its part of the triangles.
+// Estimate of the memory of a solver for each element, in bytes, measured at a million particles. It only decides whether
+// a scene is refused with a message, or the process tries to build it.
+
+/// A particle, including its share of the triangles.
 const PARTICLE_BYTES: u64 = 150;
 const CONSTRAINT_BYTES: u64 = 48;
 const BEND_BYTES: u64 = 100;
@@ -31,7 +32,7 @@ impl Scene {
     /// Checks that the process gets about the memory that a solver of this scene takes.
     ///
     /// # Errors
-    /// It does not. Without this check, the process would end where it asks for the memory.
+    /// The process cannot reserve that much memory. Building the solver would abort the process.
     pub fn check_memory(&self) -> Result<(), NotEnoughMemory> {
         let needed_bytes = self.memory_bytes();
         let needed_mib = needed_bytes >> 20;

@@ -47,13 +47,23 @@ impl Energy {
     }
 }
 
+impl Scene {
+    /// Returns the unit of [`Energy`]: "J", or that of another unit of length, such as "kg cm²/s²".
+    pub fn energy_unit(&self) -> String {
+        match self.unit.as_str() {
+            "m" => "J".to_owned(),
+            unit => format!("kg {unit}²/s²"),
+        }
+    }
+}
+
 /// Measures the energy of the states of a scene, in any process.
 #[derive(Debug, Clone)]
 pub struct EnergyMeter {
     model: Arc<Model>,
     /// The torn constraints of the newest state.
     torn: Vec<u32>,
-    /// By constraint: it is one of them.
+    /// By constraint: `true` if it is torn.
     is_torn: Vec<bool>,
     /// The sides of the paths of bends.
     bend_sides: TornSides,
@@ -99,10 +109,15 @@ impl EnergyMeter {
         Some(Energy { elastic, ..of_particles })
     }
 
-    /// Returns the energy of a solver of the same scene after its last step, or 0 of one of another scene.
+    /// Returns the energy of a solver of the same scene after its last step.
+    ///
+    /// # Panics
+    /// The solver has another number of particles than the scene.
     pub fn measure_solver(&mut self, solver: &Solver) -> Energy {
         let torn = solver.torn().iter().copied();
-        self.measure(solver.particles(), torn, &solver.parameter_values()).unwrap_or_default()
+        let energy = self.measure(solver.particles(), torn, &solver.parameter_values());
+        let Some(energy) = energy else { unreachable!("the solver is of another scene") };
+        energy
     }
 
     /// Replaces the torn constraints. Returns false if one of them is unknown.

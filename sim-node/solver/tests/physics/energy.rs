@@ -118,6 +118,14 @@ fn a_hinge_that_is_folded_at_rest_stores_nothing() {
 }
 
 #[test]
+fn the_unit_of_energy_follows_from_that_of_length() {
+    let unit = |text: &str| {
+        Scene::from_toml(&format!("version = 1\n{text}"), "test").unwrap().energy_unit()
+    };
+    assert_eq!((unit("").as_str(), unit("unit = \"cm\"").as_str()), ("J", "kg cm²/s²"));
+}
+
+#[test]
 fn a_meter_measures_the_states_of_its_scene_only() {
     let scene = |count: usize| {
         let text =

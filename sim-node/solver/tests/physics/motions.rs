@@ -170,9 +170,13 @@ fn appended_points_go_on_with_the_times_of_the_motion() {
     assert_near("end", 3.0, center(&moving), 1e-6);
     follow_as(&mut moving, object, 0, (&[point(0.5, 0.0)], true)).unwrap();
     step(&mut moving, 24);
-    assert_near("after the end", 3.0 * (0.5 - 0.35) / 0.3, center(&moving), 1e-6);
+    assert_near("after the end", 3.0 * (0.5 - 0.35) / 0.25, center(&moving), 1e-6);
     let early = follow_as(&mut moving, object, 0, (&[point(0.5, 0.0)], true));
     assert_eq!(early, Err(Reason::OutOfRange));
+    step(&mut moving, 72);
+    // The motion has ended, and this time is over.
+    let late = follow_as(&mut moving, object, 0, (&[point(0.6, 0.0)], true));
+    assert_eq!(late, Err(Reason::OutOfRange));
 }
 
 /// A state in the middle of motions continues bit for bit in another solver, and steps say when they change more of it

@@ -146,10 +146,15 @@ fn numbered_path(path: &Path, number: u64) -> PathBuf {
     path.with_file_name(name)
 }
 
-/// Returns `true` for a recording, finished or not, of any format, and for an empty file, which a recorder
-/// leaves that is killed within its first second.
+/// Returns `true` for a recording, finished or not, of any format, and for the file of a recorder that was killed
+/// within its first second: it is empty, or ends in its header.
 fn is_recording(path: &Path) -> bool {
-    matches!(LogReader::open(path), Ok(_) | Err(ReadError::Version { .. } | ReadError::Empty))
+    let is_unfinished = path.extension().is_some_and(|extension| extension == "part");
+    match LogReader::open(path) {
+        Ok(_) | Err(ReadError::Version { .. } | ReadError::Empty) => true,
+        Err(ReadError::NoHeader(_)) => is_unfinished,
+        Err(_) => false,
+    }
 }
 
 /// Splits a name before `.mcap`. Any other ending belongs to the name.
