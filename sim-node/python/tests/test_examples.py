@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import catenary
+import conftest
 import nbformat
 import numpy as np
 import pytest
@@ -100,6 +101,16 @@ def test_the_stretch_of_a_rope_falls_with_iterations_and_the_square_of_substeps(
     stretch = {(int(substeps), int(passes)): float(number) for substeps, passes, number in rows}
     assert stretch[1, 4] / stretch[1, 16] == pytest.approx(4, rel=0.05)
     assert stretch[4, 1] / stretch[16, 1] == pytest.approx(16, rel=0.05)
+
+
+@pytest.mark.parametrize("name", ["euler", "iterations", "stiffness", "f32", "dissipation"])
+def test_each_lesson_is_drawn(name: str, tmp_path: Path) -> None:
+    lesson = [str(conftest.PROGRAMS / "sim-node"), "lesson", name, "--json"]
+    tables = subprocess.run(lesson, capture_output=True, check=True, timeout=DEADLINE).stdout
+    picture = tmp_path / "lesson.png"
+    draw = [sys.executable, str(PROGRAMS / "lesson" / "plot.py"), str(picture)]
+    subprocess.run(draw, input=tables, check=True, timeout=DEADLINE)
+    assert picture.read_bytes().startswith(b"\x89PNG")
 
 
 def test_the_notebook_runs() -> None:
