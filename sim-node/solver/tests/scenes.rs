@@ -19,7 +19,7 @@ fn the_curtain_has_168_particles_596_sticks_and_14_pins() {
         bends: 0,
         pins: 14,
         triangles: 286,
-        colliders: 0,
+        colliders: 1,
         anchors: 0,
     };
     assert_eq!(counts, expected);
