@@ -133,7 +133,7 @@ def test_commands_return_their_outcome_or_raise_with_the_reason(start_node: Star
         (lambda: node.set(damping=float("nan")), "non_finite"),
         (lambda: node.set(damping=-1), "out_of_range"),
         (lambda: node.move_anchor(0, (0, 0, 0)), "unknown_anchor"),
-        (lambda: node.move_collider(0, (0, 0, 0)), "unknown_collider"),
+        (lambda: node.move_collider(1, (0, 0, 0)), "unknown_collider"),
         (lambda: node.rewind(to_step=10**9), "out_of_range"),
     ]
     for command, reason in rejected:
@@ -149,7 +149,7 @@ def test_a_rejection_names_the_allowed_values(start_node: StartNode) -> None:
     rejected: list[tuple[catenary.Action, str]] = [
         (catenary.Action.pin(168), "0 to 167"),
         (catenary.Action.cut(596), "0 to 595"),
-        (catenary.Action.move_collider(0, (0, 0, 0)), "none, because there is none"),
+        (catenary.Action.move_collider(1, (0, 0, 0)), "0"),
         (catenary.Action.set("dampness", 1), "gravity, damping, .*"),
         (catenary.Action.set("damping", float("nan")), "finite numbers"),
         (catenary.Action.set("damping", -1), "a number >= 0, or off for 0"),
@@ -161,6 +161,8 @@ def test_a_rejection_names_the_allowed_values(start_node: StartNode) -> None:
             node.request(action)
         with pytest.raises(catenary.Rejected, match=message):
             simulation.apply(action)
+    with pytest.raises(catenary.Rejected, match="none, because there is none"):
+        catenary.Simulation("rope").apply(catenary.Action.move_collider(0, (0, 0, 0)))
 
 
 def test_many_commands_are_sent_before_the_first_answer(start_node: StartNode) -> None:
