@@ -54,7 +54,6 @@
 
 mod complete_state;
 mod counted;
-mod energy;
 mod intact_parts;
 mod log;
 pub mod pictures;
@@ -69,7 +68,6 @@ pub mod verification;
 
 pub use complete_state::{CompleteState, CompleteStateError, complete_state};
 pub use counted::counted;
-pub use energy::RecordedEnergy;
 pub use intact_parts::{IntactParts, RepairedBytes, load_rows};
 pub use log::*;
 pub use recorded_scene::{RecordedSceneError, recorded_scene, scene_to_simulate};

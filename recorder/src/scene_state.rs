@@ -9,11 +9,12 @@ use sim_contract::{
     ColliderState, ConstraintState, ParameterValues, ParticleState, Torn, Triangle,
 };
 use sim_solver::scene::{ColliderMesh, ColliderMeshes};
-use sim_solver::{Scene, Solver, TornSides};
+use sim_solver::{EnergyMeter, Scene, Solver, TornSides};
 
 use crate::log::{
-    ColliderRow, CollidersRow, ForcesRow, Frame, FrameReader, LogReader, Message, OutcomeRow,
-    ParametersRow, ReadError, ShapeRow, StepRow, Tape, TapeError, TearTracker, constraint_state,
+    ColliderRow, CollidersRow, EnergyRow, ForcesRow, Frame, FrameReader, LogReader, Message,
+    OutcomeRow, ParametersRow, ReadError, ShapeRow, StepRow, Tape, TapeError, TearTracker,
+    constraint_state,
 };
 use crate::recorded_scene::recorded_scene;
 use crate::simulation::{colliders_row, forces_row, step_row};
@@ -118,7 +119,7 @@ pub fn visit_states<R: Read, E: From<SceneStateError>>(
             if visit(&state)?.is_break() {
                 break;
             }
-            // The recorder writes outcomes in batches, which may contain those of later steps.
+            // The recorder writes outcomes in batches, which may contain outcomes of later steps.
             let step = state.row.step;
             state.outcomes.retain(|row| row.step > step);
         }
@@ -222,6 +223,16 @@ impl SceneState {
 
     fn has_meshes(&self) -> bool {
         self.colliders.iter().any(|one| matches!(one.shape, ShapeRow::Mesh { .. }))
+    }
+
+    /// Returns the recorded energy of the state, or measures the energy. `None` if the parameters were not recorded, or
+    /// the state is not a state of the scene.
+    pub fn energy(&self, meter: &mut EnergyMeter) -> Option<EnergyRow> {
+        self.row.energy.or_else(|| {
+            let particles = bytemuck::cast_slice(&self.particles);
+            let parameters = self.parameters.as_ref()?;
+            meter.measure(particles, self.torn_constraints(), parameters).map(EnergyRow::from)
+        })
     }
 
     /// Returns the triangles of a collider that is a mesh.

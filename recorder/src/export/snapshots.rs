@@ -51,7 +51,7 @@ impl Snapshots<'_> {
         step.saturating_sub(self.first_step) as f64 / f64::from(self.run.rate_hz)
     }
 
-    /// Returns `true` if a motion leads from the state of one step to that of a later one.
+    /// Returns `true` if a motion leads from the state of one step to the state of a later step.
     pub(crate) fn is_continuous(&self, [from, to]: [u64; 2]) -> bool {
         self.replaced_at.range(from + 1..=to).next().is_none()
     }
@@ -96,7 +96,7 @@ impl Snapshots<'_> {
     }
 }
 
-/// Returns the outcomes of commands that a state adds. The first selected snapshot adds those of its step.
+/// Returns the outcomes of commands that a state adds. The first selected snapshot adds the outcomes of its step.
 pub(crate) fn new_outcomes(state: &SceneState) -> &[OutcomeRow] {
     // They are in the order of their steps.
     let end = state.outcomes.partition_point(|row| row.step <= state.row.step);

@@ -15,7 +15,7 @@ pub struct TimedCommand {
     pub index: Option<u64>,
     /// Sender of the command. 0 is the console.
     pub client_id: u64,
-    /// Number of the command among those of its client; by default its number in the file, from 1.
+    /// Number of the command among the commands of its client; by default the number of the command in the file, from 1.
     pub sequence: u64,
     /// The command.
     pub action: Action,

@@ -1,7 +1,6 @@
 //! The JSON rows of a recording. The schemas in the file are derived from these types.
 
 mod colliders;
-mod energy;
 mod event;
 mod forces;
 mod json;
@@ -14,13 +13,12 @@ mod tears;
 mod topology;
 
 pub use colliders::{ColliderBodyRow, ColliderDetails, ColliderRow, CollidersRow, ShapeRow};
-pub use energy::EnergyRow;
 pub use event::EventRow;
 pub use forces::{AnchorForceRow, ColliderForceRow, ForcesRow};
 pub use outcome::OutcomeRow;
 pub use parameters::ParametersRow;
 pub use scene_colliders::{MeshFile, SceneColliders};
 pub use status::StatusRow;
-pub use step::StepRow;
+pub use step::{EnergyRow, StepRow};
 pub use tears::TearsRow;
 pub use topology::{BendColumns, Softness, SurfaceRow, TopologyRow, bend_state, constraint_state};

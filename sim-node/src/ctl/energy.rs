@@ -19,7 +19,7 @@ pub(super) struct EnergyRow {
     step: u64,
     #[serde(flatten)]
     energy: Energy,
-    /// "J", or the unit that follows from that of the scene.
+    /// Unit of the energies: "J", or another one such as "kg cm²/s²".
     unit: String,
 }
 

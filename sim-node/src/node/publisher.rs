@@ -555,6 +555,7 @@ mod tests {
             let position = Position { step, is_paused: false, time_scale: 1.0, is_last: false };
             publisher.publish_step(solver, position, StepTimes::default()).unwrap();
             assert_eq!(publisher.is_in_place(step), step == 101);
+            assert_eq!(publisher.has_published_in_place(step), step == 101);
             lists += u64::from(solver.new_torn_count() > 0);
             let torn = client.torn(Duration::from_secs(10)).unwrap();
             assert_eq!(torn.constraints, pairs(solver), "step {step}");
@@ -568,7 +569,12 @@ mod tests {
         solver.reset();
         publisher.add_outcome(101, Command::default(), Ok(Applied::InPlace));
         solver.set("tear_force", ParameterValue::Number(2.0), None).unwrap();
-        for step in 101..=150 {
+        step_on(&mut solver, &mut publisher, 101);
+        // Another reset, before the next step, leaves the published one as it is.
+        publisher.show_in_place(102);
+        assert!(publisher.has_published_in_place(101) && !publisher.has_published_in_place(102));
+        publisher.show_in_place(101);
+        for step in 102..=150 {
             step_on(&mut solver, &mut publisher, step);
         }
         assert!(lists > 10, "{lists} steps with tears");

@@ -6,16 +6,16 @@ use std::ops::ControlFlow;
 
 use anyhow::Context;
 use recorder::{
-    ContentSelection, EnergyRow, FrameReader, LogReader, RecordedEnergy, SceneState,
-    SceneStateError, recorded_scene, visit_states,
+    ContentSelection, EnergyRow, FrameReader, LogReader, SceneState, SceneStateError,
+    recorded_scene, visit_states,
 };
 use serde::Serialize;
-use sim_solver::Scene;
+use sim_solver::{EnergyMeter, Scene};
 
 /// The energy at the ends of a recording, and the limits of its sum.
 #[derive(Debug, Serialize)]
 pub(super) struct EnergyReport {
-    /// "J", or the unit that follows from that of the scene.
+    /// Unit of the energies: "J", or another one such as "kg cm²/s²".
     unit: String,
     #[serde(flatten)]
     range: EnergyRange,
@@ -67,10 +67,10 @@ fn measured<R: Read>(log: LogReader<R>, scene: &Scene) -> anyhow::Result<Option<
     let selection = log.selection();
     selection.require(&ContentSelection::FOR_ENERGY, PURPOSE)?;
     selection.require_all_particles(PURPOSE)?;
-    let mut measured = RecordedEnergy::new(scene);
+    let mut meter = EnergyMeter::new(scene);
     let mut range = None;
     visit_states(log, None, |state: &SceneState| {
-        if let Some(energy) = measured.of(state) {
+        if let Some(energy) = state.energy(&mut meter) {
             range = Some(EnergyRange::with(range, state.row.step, energy));
         }
         Ok::<_, SceneStateError>(ControlFlow::Continue(()))

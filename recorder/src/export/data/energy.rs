@@ -3,7 +3,8 @@
 use std::io::Write;
 
 use anyhow::Context;
-use recorder::{EnergyRow, RecordedEnergy};
+use recorder::EnergyRow;
+use sim_solver::EnergyMeter;
 
 use crate::export::snapshots::Snapshots;
 
@@ -12,11 +13,11 @@ const COLUMNS: &str = "step,time_s,kinetic,potential,elastic,total";
 /// Writes the table. Numbers have as many digits as their bits need, so reading gives the same bits.
 pub(crate) fn write(snapshots: &Snapshots<'_>, out: &mut dyn Write) -> anyhow::Result<()> {
     let scene = snapshots.scene.context("the recording has no readable scene")?;
-    let mut measured = RecordedEnergy::new(scene);
+    let mut meter = EnergyMeter::new(scene);
     writeln!(out, "{COLUMNS}")?;
     snapshots.for_each(|state| {
         let step = state.row.step;
-        let energy = measured.of(state).with_context(|| {
+        let energy = state.energy(&mut meter).with_context(|| {
             format!("the state of step {step} has no energy: its parameters were not recorded, or it is not one of the scene")
         })?;
         let (time_s, total) = (snapshots.run_time_s(step), energy.total());

@@ -33,7 +33,7 @@ impl Energy {
         self.kinetic + self.potential + self.elastic
     }
 
-    /// The energy of free particles in gravity, without that of constraints. A held particle has the inverse mass 0, and
+    /// The energy of free particles in gravity, without the energy of constraints. A held particle has the inverse mass 0, and
     /// does not count.
     pub fn of_particles(particles: &[Particle], gravity: [f32; 3]) -> Self {
         let gravity = vector(gravity);
@@ -48,7 +48,7 @@ impl Energy {
 }
 
 impl Scene {
-    /// Returns the unit of [`Energy`]: "J", or that of another unit of length, such as "kg cm²/s²".
+    /// Returns the unit of [`Energy`]: "J" for metres, and for another unit of length a unit such as "kg cm²/s²".
     pub fn energy_unit(&self) -> String {
         match self.unit.as_str() {
             "m" => "J".to_owned(),

@@ -45,7 +45,7 @@ impl FileNames {
     /// Numbers the files after the numbered files in the folder. Returns those files, oldest first.
     ///
     /// # Errors
-    /// If the numbers in the folder are too far apart to be those of one series.
+    /// If the numbers of the files in the folder are too far apart for one series of files.
     pub(crate) fn after_earlier_files(mut self) -> anyhow::Result<(Self, Vec<PathBuf>)> {
         let earlier = self.earlier_files();
         for pair in earlier.windows(2) {
