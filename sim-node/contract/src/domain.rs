@@ -8,7 +8,6 @@ use std::time::Duration;
 
 use iceoryx2::prelude::Config;
 
-use crate::domain::config_file::ConfigFileError;
 use crate::domain::nodes::ListedNode;
 use crate::endpoint::Endpoint;
 use crate::ports::domain::leftovers::{self, Leftover};
@@ -70,12 +69,9 @@ impl Domain {
         length.saturating_sub(Self::PATH_LENGTH_MAX)
     }
 
-    /// Returns a complete `iceoryx2.toml` with which other programs of iceoryx2, such as `iox2`, see the
-    /// services of this domain.
-    ///
-    /// # Errors
-    /// The configuration contains a path that is not UTF-8.
-    pub fn iceoryx2_toml(&self) -> Result<String, ConfigFileError> {
+    /// Returns an `iceoryx2.toml` with which other programs of iceoryx2, such as `iox2`, see the services of
+    /// this domain.
+    pub fn iceoryx2_toml(&self) -> String {
         config_file::to_text(&self.config)
     }
 

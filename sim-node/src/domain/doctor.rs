@@ -63,7 +63,7 @@ fn print_config(endpoint: &Endpoint, domain: &Domain) -> anyhow::Result<()> {
     let name = endpoint
         .domain()
         .map_or("the default domain".to_owned(), |name| format!("the domain '{name}'"));
-    let config = domain.iceoryx2_toml()?;
+    let config = domain.iceoryx2_toml();
     output::file(&format!(
         "# Configuration of iceoryx2 for {name} of Catenary. As config/iceoryx2.toml in the current folder,\n\
          # or as ~/.config/iceoryx2/iceoryx2.toml, it shows the services of the domain to `iox2` and to other\n\

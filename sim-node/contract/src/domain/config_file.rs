@@ -1,10 +1,12 @@
 //! Configuration files of iceoryx2.
 
-use std::fs::File;
-use std::io::{self, Read};
+use std::fs;
+use std::io;
+use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 
-use iceoryx2::prelude::Config;
+use iceoryx2::config::ConfigCreationError;
+use iceoryx2::prelude::{Config, FilePath, SemanticString};
 use thiserror::Error;
 
 use crate::ports::domain::root;
@@ -28,9 +30,11 @@ pub enum ConfigFileError {
     /// The file cannot be read.
     #[error("it cannot be read: {0}")]
     Unreadable(String),
-    /// The text is no configuration.
-    #[error("it is not a configuration of iceoryx2: {0}")]
-    Invalid(String),
+    /// iceoryx2 cannot read the text.
+    #[error(
+        "it is not a configuration of iceoryx2; IOX2_LOG_LEVEL=debug prints the line and the reason"
+    )]
+    Invalid,
 }
 
 impl ConfigFile {
@@ -39,31 +43,82 @@ impl ConfigFile {
     /// # Errors
     /// The file cannot be read, or iceoryx2 would ignore it because it is invalid.
     pub fn read(path: &Path) -> Result<Option<Self>, ConfigFileError> {
-        let unreadable = |error: io::Error| ConfigFileError::Unreadable(error.to_string());
-        let file = match File::open(path) {
+        let metadata = match fs::metadata(path) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
-            file => file.map_err(unreadable)?,
+            metadata => metadata.map_err(|error| ConfigFileError::Unreadable(error.to_string()))?,
         };
-        let mut text = String::new();
-        file.take(SIZE_BYTES_MAX).read_to_string(&mut text).map_err(unreadable)?;
-        let config: Config = toml::from_str(&text)
-            .map_err(|error| ConfigFileError::Invalid(error.message().to_owned()))?;
-        let prefix = config.global.prefix.to_string();
-        Ok(Some(Self { prefix, root: root::path(&config) }))
+        if !metadata.is_file() || metadata.len() > SIZE_BYTES_MAX {
+            let problem = format!("it is not a file of at most {SIZE_BYTES_MAX} bytes");
+            return Err(ConfigFileError::Unreadable(problem));
+        }
+        let name = FilePath::new(path.as_os_str().as_bytes())
+            .map_err(|error| ConfigFileError::Unreadable(format!("{error:?}")))?;
+        match Config::from_file(&name) {
+            Ok(config) => {
+                let prefix = config.global.prefix.to_string();
+                Ok(Some(Self { prefix, root: root::path(&config) }))
+            }
+            Err(ConfigCreationError::UnableToDeserializeContents) => Err(ConfigFileError::Invalid),
+            Err(error) => Err(ConfigFileError::Unreadable(format!("{error:?}"))),
+        }
     }
 }
 
-/// Returns a configuration as the text of a file.
-pub(crate) fn to_text(config: &Config) -> Result<String, ConfigFileError> {
-    toml::to_string(config).map_err(|error| ConfigFileError::Invalid(error.to_string()))
+/// Returns the keys of a configuration that Catenary sets, as the text of a file. iceoryx2 has defaults for
+/// all other keys.
+pub(crate) fn to_text(config: &Config) -> String {
+    let Config { global, defaults, .. } = config;
+    let (services, events) = (&defaults.publish_subscribe, &defaults.event);
+    format!(
+        r#"[global]
+root-path = {:?}
+prefix = {:?}
+
+[global.creation-timeout]
+secs = {}
+nanos = {}
+
+[global.node]
+cleanup-dead-nodes-on-creation = {}
+cleanup-dead-nodes-on-destruction = {}
+
+[global.service]
+cleanup-dead-nodes-on-open = {}
+
+[defaults.publish-subscribe]
+max-publishers = {}
+max-subscribers = {}
+max-nodes = {}
+subscriber-max-buffer-size = {}
+subscriber-max-borrowed-samples = {}
+publisher-history-size = {}
+
+[defaults.event]
+max-notifiers = {}
+max-listeners = {}
+max-nodes = {}
+"#,
+        root::path(config).to_string_lossy(),
+        global.prefix.to_string(),
+        global.creation_timeout.as_secs(),
+        global.creation_timeout.subsec_nanos(),
+        global.node.cleanup_dead_nodes_on_creation,
+        global.node.cleanup_dead_nodes_on_destruction,
+        global.service.cleanup_dead_nodes_on_open,
+        services.max_publishers,
+        services.max_subscribers,
+        services.max_nodes,
+        services.subscriber_max_buffer_size,
+        services.subscriber_max_borrowed_samples,
+        services.publisher_history_size,
+        events.max_notifiers,
+        events.max_listeners,
+        events.max_nodes,
+    )
 }
 
 #[cfg(test)]
 mod tests {
-    use std::fs;
-
-    use iceoryx2::prelude::{FilePath, SemanticString};
-
     use super::*;
     use crate::domain::Domain;
     use crate::ports::domain;
@@ -81,7 +136,7 @@ mod tests {
     #[test]
     fn iceoryx2_reads_the_printed_text_as_the_configuration_of_the_domain() {
         let outside = Domain::new(&TestDomain::new().endpoint()).unwrap();
-        let (_scratch, path) = file_with(&outside.iceoryx2_toml().unwrap());
+        let (_scratch, path) = file_with(&outside.iceoryx2_toml());
         let name = FilePath::new(path.to_str().unwrap().as_bytes()).unwrap();
         let loaded = Config::from_file(&name).unwrap();
         assert_eq!(loaded, outside.config);
@@ -100,7 +155,7 @@ mod tests {
         for text in ["[global]\nprefix = 3\n", "prefix ="] {
             let (_scratch, path) = file_with(text);
             let error = ConfigFile::read(&path).unwrap_err();
-            assert!(matches!(error, ConfigFileError::Invalid(_)), "{error}");
+            assert!(matches!(error, ConfigFileError::Invalid), "{error}");
         }
         let unreadable = ConfigFile::read(path.parent().unwrap()).unwrap_err();
         assert!(matches!(unreadable, ConfigFileError::Unreadable(_)), "{unreadable}");
