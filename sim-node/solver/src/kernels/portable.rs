@@ -1,4 +1,4 @@
-//! Eight lanes as a plain array, which the compiler vectorises as far as the target allows.
+//! Eight lanes in the baseline registers of any processor: SSE2, NEON, or SIMD of WebAssembly.
 
 #![allow(
     unsafe_code,
@@ -8,52 +8,44 @@
 use std::cell::Cell;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-use super::lanes::{LaneWork, Lanes, Lanes8, PackedParticle, Wide, axes};
+use wide::f32x8;
 
-/// Eight numbers in an array.
+use super::lanes::{LaneWork, Lanes, Lanes8, PackedParticle, Wide, axes, map_axes};
+
+/// Eight numbers.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Portable(Lanes8);
+pub(crate) struct Portable(f32x8);
+
+/// Eight booleans: all bits set, or none.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct PortableMask(f32x8);
 
 /// Indices of the first of three classes of numbers, by lane.
 const THIRDS: [usize; 8] = [0, 9, 18, 3, 12, 21, 6, 15];
 
-/// An array of one expression for each lane.
-///
-/// Written out: loops over the lanes would be unrolled anyway, and the compiler takes minutes for thousands
-/// of them in one function.
-macro_rules! by_lane {
-    (|$lane:ident| $value:expr) => {
-        [
-            by_lane!($lane = 0, $value),
-            by_lane!($lane = 1, $value),
-            by_lane!($lane = 2, $value),
-            by_lane!($lane = 3, $value),
-            by_lane!($lane = 4, $value),
-            by_lane!($lane = 5, $value),
-            by_lane!($lane = 6, $value),
-            by_lane!($lane = 7, $value),
-        ]
-    };
-    ($lane:ident = $number:literal, $value:expr) => {{
-        let $lane = $number;
-        $value
-    }};
-}
-
-/// Runs work on arrays. Not inlined: it would be compiled again for each of its callers.
+/// Runs work on baseline registers. Not inlined: it would be compiled again for each of its callers.
 #[inline(never)]
 pub(crate) fn run<T: LaneWork>(work: T) -> T::Output {
     work.run::<Portable>()
+}
+
+/// Builds eight lanes, lane by lane. (Loops over the lanes slow the compiler down.)
+#[inline(always)]
+fn by_lane(number: impl Fn(usize) -> f32) -> Portable {
+    let (low, high) = ([0, 1, 2, 3].map(&number), [4, 5, 6, 7].map(&number));
+    let ([a, b, c, d], [e, f, g, h]) = (low, high);
+    Portable(f32x8::new([a, b, c, d, e, f, g, h]))
 }
 
 impl Portable {
     /// Numbers of `low`, from 0, and of `high`, from 8.
     #[inline(always)]
     fn pick(low: Self, high: Self, from: [usize; 8]) -> Self {
-        Self(by_lane!(|lane| match from[lane] {
-            number @ 0..8 => low.0[number],
-            number => high.0[number - 8],
-        }))
+        let (low, high) = (low.0.to_array(), high.0.to_array());
+        by_lane(|lane| match from[lane] {
+            number @ 0..8 => low[number],
+            number => high[number - 8],
+        })
     }
 }
 
@@ -62,7 +54,7 @@ impl Add for Portable {
 
     #[inline(always)]
     fn add(self, other: Self) -> Self {
-        Self(by_lane!(|lane| self.0[lane] + other.0[lane]))
+        Self(self.0 + other.0)
     }
 }
 
@@ -71,7 +63,7 @@ impl Sub for Portable {
 
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
-        Self(by_lane!(|lane| self.0[lane] - other.0[lane]))
+        Self(self.0 - other.0)
     }
 }
 
@@ -80,7 +72,7 @@ impl Mul for Portable {
 
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
-        Self(by_lane!(|lane| self.0[lane] * other.0[lane]))
+        Self(self.0 * other.0)
     }
 }
 
@@ -89,7 +81,7 @@ impl Div for Portable {
 
     #[inline(always)]
     fn div(self, other: Self) -> Self {
-        Self(by_lane!(|lane| self.0[lane] / other.0[lane]))
+        Self(self.0 / other.0)
     }
 }
 
@@ -98,87 +90,84 @@ impl Neg for Portable {
 
     #[inline(always)]
     fn neg(self) -> Self {
-        Self(by_lane!(|lane| -self.0[lane]))
+        Self(-self.0)
     }
 }
 
 impl Lanes for Portable {
-    type Mask = [bool; 8];
+    type Mask = PortableMask;
 
     #[inline(always)]
     fn splat(number: f32) -> Self {
-        Self([number; 8])
+        Self(f32x8::splat(number))
     }
 
     #[inline(always)]
     fn load(from: &Lanes8, _lane: usize) -> Self {
-        Self(*from)
+        Self(f32x8::new(*from))
     }
 
     #[inline(always)]
     fn store(self, to: &mut Lanes8, _lane: usize) {
-        *to = self.0;
+        *to = self.0.to_array();
     }
 
     #[inline(always)]
     fn sqrt(self) -> Self {
-        Self(by_lane!(|lane| self.0[lane].sqrt()))
+        Self(self.0.sqrt())
     }
 
     #[inline(always)]
     fn abs(self) -> Self {
-        Self(by_lane!(|lane| self.0[lane].abs()))
+        Self(self.0.abs())
     }
 
     #[inline(always)]
     fn max_or_rhs(self, rhs: Self) -> Self {
-        Self(by_lane!(|lane| match (self.0[lane], rhs.0[lane]) {
-            (number, rhs) if number > rhs => number,
-            (_, rhs) => rhs,
-        }))
+        // Not a maximum of `wide`: instruction sets differ in the maximum of equal numbers and of NaN.
+        Self(self.0.simd_gt(rhs.0).bitselect(self.0, rhs.0))
     }
 
     #[inline(always)]
-    fn is_below(self, other: Self) -> [bool; 8] {
-        by_lane!(|lane| self.0[lane] < other.0[lane])
+    fn is_below(self, other: Self) -> PortableMask {
+        PortableMask(self.0.simd_lt(other.0))
     }
 
     #[inline(always)]
-    fn is_at_most(self, other: Self) -> [bool; 8] {
-        by_lane!(|lane| self.0[lane] <= other.0[lane])
+    fn is_at_most(self, other: Self) -> PortableMask {
+        PortableMask(self.0.simd_le(other.0))
     }
 
     #[inline(always)]
-    fn is_not_nan(self) -> [bool; 8] {
-        by_lane!(|lane| !self.0[lane].is_nan())
+    fn is_not_nan(self) -> PortableMask {
+        PortableMask(self.0.simd_eq(self.0))
     }
 
     #[inline(always)]
-    fn both(a: [bool; 8], b: [bool; 8]) -> [bool; 8] {
-        by_lane!(|lane| a[lane] & b[lane])
+    fn both(a: PortableMask, b: PortableMask) -> PortableMask {
+        PortableMask(a.0 & b.0)
     }
 
     #[inline(always)]
-    fn select(mask: [bool; 8], yes: Self, no: Self) -> Self {
-        Self(by_lane!(|lane| if mask[lane] { yes.0[lane] } else { no.0[lane] }))
+    fn select(mask: PortableMask, yes: Self, no: Self) -> Self {
+        Self(mask.0.bitselect(yes.0, no.0))
     }
 
     #[inline(always)]
-    fn masked(self, mask: [bool; 8]) -> Self {
-        Self::select(mask, self, Self::splat(0.0))
+    fn masked(self, mask: PortableMask) -> Self {
+        Self(self.0 & mask.0)
     }
 
     #[inline(always)]
-    fn any(mask: [bool; 8]) -> bool {
-        Self::bits(mask) != 0
+    fn any(mask: PortableMask) -> bool {
+        mask.0.any()
     }
 }
 
 impl Wide for Portable {
     #[inline(always)]
-    fn bits(mask: [bool; 8]) -> u32 {
-        let [a, b, c, d, e, f, g, h] = by_lane!(|lane| u32::from(mask[lane]) << lane);
-        a | b | c | d | e | f | g | h
+    fn bits(mask: PortableMask) -> u32 {
+        mask.0.to_bitmask()
     }
 
     #[inline(always)]
@@ -207,45 +196,46 @@ impl Wide for Portable {
 
     #[inline(always)]
     fn unzip_thirds(numbers: [Self; 3]) -> [Self; 3] {
+        let [a, b, c] = map_axes(numbers, |numbers| numbers.0.to_array());
         axes(|third| {
-            Self(by_lane!(|lane| {
-                let index = THIRDS[lane] + third;
-                numbers[index / 8].0[index % 8]
-            }))
+            by_lane(|lane| match THIRDS[lane] + third {
+                index @ 0..8 => a[index],
+                index @ 8..16 => b[index - 8],
+                index => c[index - 16],
+            })
         })
     }
 
     #[inline(always)]
     fn zip_thirds(thirds: [Self; 3]) -> [Self; 3] {
-        let mut numbers = [Self([0.0; 8]); 3];
-        for (third, from) in thirds.into_iter().enumerate() {
-            for (lane, index) in THIRDS.into_iter().enumerate() {
-                numbers[(index + third) / 8].0[(index + third) % 8] = from.0[lane];
-            }
-        }
-        numbers
+        let thirds = map_axes(thirds, |third| third.0.to_array());
+        // A third of `THIRDS` is its own inverse.
+        let number = |index: usize| thirds[index % 3][THIRDS[index / 3] / 3];
+        axes(|numbers| by_lane(|lane| number(8 * numbers + lane)))
     }
 
     #[inline(always)]
     fn columns(particles: &[PackedParticle; 8]) -> [[Self; 4]; 2] {
-        let column = |number: usize| Self(by_lane!(|lane| particles[lane].0[number]));
+        let column = |number: usize| by_lane(|lane| particles[lane].0[number]);
         [[column(0), column(1), column(2), column(3)], [column(4), column(5), column(6), column(7)]]
     }
 
     #[inline(always)]
     fn set_displacements(particles: &mut [PackedParticle; 8], displacements: [Self; 3]) {
+        let displacements = map_axes(displacements, |along| along.0.to_array());
         for (lane, particle) in particles.iter_mut().enumerate() {
             for (axis, along) in displacements.iter().enumerate() {
-                particle.0[4 + axis] = along.0[lane];
+                particle.0[4 + axis] = along[lane];
             }
         }
     }
 
     #[inline(always)]
     fn set_positions(particles: &mut [PackedParticle; 8], positions: [Self; 3]) {
+        let positions = map_axes(positions, |along| along.0.to_array());
         for (lane, particle) in particles.iter_mut().enumerate() {
             for (axis, along) in positions.iter().enumerate() {
-                particle.0[axis] = along.0[lane];
+                particle.0[axis] = along[lane];
             }
         }
     }
@@ -256,10 +246,9 @@ impl Wide for Portable {
         a: &[u32; 8],
         b: &[u32; 8],
     ) -> [[Self; 3]; 2] {
-        let from = by_lane!(|lane| particles[a[lane] as usize].get().0);
-        let to = by_lane!(|lane| particles[b[lane] as usize].get().0);
-        let difference =
-            |number: usize| Self(by_lane!(|lane| to[lane][number] - from[lane][number]));
+        let particle = |index: u32| particles[index as usize].get().0;
+        let (from, to) = (a.map(particle), b.map(particle));
+        let difference = |number: usize| by_lane(|lane| to[lane][number] - from[lane][number]);
         [axes(difference), axes(|axis| difference(4 + axis))]
     }
 
@@ -269,11 +258,12 @@ impl Wide for Portable {
         indices: &[u32; 8],
         amounts: [Self; 3],
     ) {
+        let amounts = map_axes(amounts, |amount| amount.0.to_array());
         for (lane, index) in indices.iter().enumerate() {
             let particle = &particles[*index as usize];
             let mut numbers = particle.get();
             for (axis, amount) in amounts.iter().enumerate() {
-                numbers.0[4 + axis] -= amount.0[lane];
+                numbers.0[4 + axis] -= amount[lane];
             }
             particle.set(numbers);
         }
