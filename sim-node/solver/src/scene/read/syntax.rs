@@ -8,6 +8,7 @@ mod pieces;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
+use serde::Deserialize;
 use sim_types::SCENE_SIZE_BYTES_MAX;
 use toml::de::{DeTable, Deserializer};
 
@@ -36,12 +37,11 @@ pub(super) fn parse(place: &Place<'_>) -> Result<FileScene, SceneError> {
             syntax_error(place, span, error.message(), String::new())
         })?;
         names.add(place, table.get_ref(), index == 0)?;
-        let mut part: FileScene = serde_path_to_error::deserialize(Deserializer::from(table))
-            .map_err(|error| {
-                let path = field_path(&error.path().to_string());
-                let path = with_earlier_pieces(&path, &file, piece.continued);
-                syntax_error(place, error.inner().span(), error.inner().message(), path)
-            })?;
+        let mut part = FileScene::deserialize(Deserializer::from(table)).map_err(|error| {
+            let path = error.span().and_then(|span| document.path_to(&span)).unwrap_or_default();
+            let path = with_earlier_pieces(&path, &file, piece.continued);
+            syntax_error(place, error.span(), error.message(), path)
+        })?;
         kept_size_bytes += part.size_bytes();
         match piece.continued {
             Some("anchor") => file.continue_anchor(&mut part),
@@ -98,12 +98,6 @@ fn split_index(path: &str) -> Option<(&str, usize, &str)> {
     let (list, rest) = path.split_once('[')?;
     let (index, rest) = rest.split_once(']')?;
     Some((list, index.parse().ok()?, rest))
-}
-
-/// Removes the segments of serde's wrappers, which begin with `$`, from a path.
-fn field_path(path: &str) -> String {
-    let segments = path.split('.').filter(|segment| !segment.starts_with('$') && *segment != "?");
-    segments.collect::<Vec<_>>().join(".")
 }
 
 fn syntax_error(

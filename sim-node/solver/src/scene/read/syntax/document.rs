@@ -5,8 +5,9 @@ use std::mem::replace;
 use std::ops::Range;
 
 use toml::Spanned;
-use toml::de::{DeTable, DeValue, Error};
+use toml::de::{DeArray, DeTable, DeValue, Error};
 
+use super::is_list_of_tables;
 use super::pieces::Piece;
 
 /// The text of a piece.
@@ -29,6 +30,12 @@ impl<'t> Document<'t> {
     pub(super) fn parse(&self) -> Result<Spanned<DeTable<'_>>, Error> {
         let table = DeTable::parse(&self.text)?;
         Ok(Spanned::new(self.place(table.span()), self.place_table(table.into_inner())))
+    }
+
+    /// Returns the path, such as `particle[3].mass`, to the key or value at a place in the scene's text. For
+    /// errors only, because it parses the document again.
+    pub(super) fn path_to(&self, place: &Range<usize>) -> Option<String> {
+        path_in_table(self.parse().ok()?.get_ref(), place)
     }
 
     /// Returns a place in the scene's text. Only its start counts for a value with parts in other
@@ -66,4 +73,39 @@ impl<'t> Document<'t> {
         };
         *value = Spanned::new(place, value_at_place);
     }
+}
+
+fn path_in_table(table: &DeTable<'_>, place: &Range<usize>) -> Option<String> {
+    table.iter().find_map(|(key, value)| {
+        let name = key.get_ref();
+        if [key.span(), value.span()].contains(place) {
+            return Some(name.to_string());
+        }
+        let (index, path) = match value.get_ref() {
+            DeValue::Table(table) => (None, path_in_table(table, place)?),
+            DeValue::Array(list) => {
+                let (index, path) = path_in_list(list, place)?;
+                (Some(index), path)
+            }
+            _ => return None,
+        };
+        // Other lists can begin in an earlier document.
+        let index = index.filter(|_| name == "path" || is_list_of_tables(name));
+        let index = index.map(|index| format!("[{index}]")).unwrap_or_default();
+        let dot = if path.is_empty() { "" } else { "." };
+        Some(format!("{name}{index}{dot}{path}"))
+    })
+}
+
+/// Returns the index of the element at a place, and the path within the element.
+fn path_in_list(list: &DeArray<'_>, place: &Range<usize>) -> Option<(usize, String)> {
+    list.iter().enumerate().find_map(|(index, element)| {
+        let path = match element.get_ref() {
+            _ if element.span() == *place => String::new(),
+            DeValue::Table(table) => path_in_table(table, place)?,
+            DeValue::Array(list) => path_in_list(list, place)?.1,
+            _ => return None,
+        };
+        Some((index, path))
+    })
 }
