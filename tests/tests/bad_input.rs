@@ -1,5 +1,4 @@
 //! The node refuses bad input with an exit code, the place of the error and the remedy.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use integration_tests::{Finished, Process, Program, Sandbox};
 

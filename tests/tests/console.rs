@@ -1,5 +1,4 @@
 //! `sim-node ctl` as a person uses it: exit codes, queries, hints and errors.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use integration_tests::{Finished, Process, Program, Sandbox, ctl};
 

@@ -1,6 +1,5 @@
 //! No control character of a file or of another process reaches a terminal: every program escapes its
 //! whole output.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use integration_tests::{Finished, Process, Program, Sandbox, ctl};
 use recorder::{Closing, LogOptions, LogReader, LogWriter, Message, RunDescription};

@@ -1,6 +1,5 @@
 //! The reference documents agree with the programs: their examples run, and they list every scene key,
 //! every kind of command, every built-in scene and every recorded topic.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use std::collections::BTreeSet;
 use std::path::Path;

@@ -1,6 +1,5 @@
 //! The energy of a state reaches other processes where they ask for it: `ctl status`, recordings and their proof,
 //! `recorder info` and a table.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a panic is how a test fails")]
 
 use std::path::Path;
 

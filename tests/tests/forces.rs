@@ -1,6 +1,5 @@
 //! Forces reach other processes: a hanging rope pulls its pin with its weight, in Rust, in `ctl forces`, in a
 //! recording and in its replay. A node computes them only while a program reads them, with the same bits.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use std::path::Path;
 use std::time::Duration;

@@ -1,11 +1,6 @@
 //! The Foxglove server, end to end: clients receive the bits that the node publishes, and their commands
 //! show in the snapshots of the node. The tests with the official client need the packages that
 //! `.ci/run` installs.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a panic is how a test fails")]
-
-#[path = "../../viewer-bridge/tests/sockets/foxglove_client.rs"]
-#[allow(dead_code, reason = "its other half is used by the tests that have no node")]
-mod foxglove_client;
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -16,7 +11,7 @@ use recorder::{FrameReader, LogReader};
 use serde_json::{Value, json};
 use sim_contract::{Client as Reader, ParticleFlags, ParticleState};
 
-use foxglove_client::Client;
+use crate::foxglove_client::Client;
 
 /// A paused node with the curtain scene, and a bridge that serves it. They end in the order of the fields: a bridge
 /// that outlives its domain would make it again.

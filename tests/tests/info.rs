@@ -1,5 +1,4 @@
 //! `recorder info` on a live and on a simulated recording: its numbers follow from the recorded rows.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use std::fs;
 use std::path::Path;

@@ -1,6 +1,5 @@
 //! The node as other processes see it: late subscribers, commands, pauses, a second node, stubborn
 //! readers, many short-lived clients.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use std::time::Duration;
 

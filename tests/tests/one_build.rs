@@ -1,6 +1,5 @@
 //! The commands of the README compile each third-party crate once: whichever package they select,
 //! Cargo enables the same features. The crate `build-features` sees to that.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use std::collections::BTreeSet;
 use std::path::Path;

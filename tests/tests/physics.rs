@@ -1,6 +1,5 @@
 //! Every command on the physics, from the command line and from other processes: the node answers it,
 //! snapshots show its effect, late subscribers see it, and a recording of it re-simulates bit for bit.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use std::fs;
 

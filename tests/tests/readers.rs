@@ -1,6 +1,5 @@
 //! Independent readers: the stock MCAP readers of Python and JavaScript find what was published in recordings,
 //! and the iceoryx2 package of Python reads a running node. These tests need what `.ci/run` installs.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};

@@ -1,13 +1,11 @@
 //! The structure and the prose of the repository: dependencies between crates and between files, the
 //! first words of doc comments, and phrases to avoid.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use cargo_metadata::MetadataCommand;
 
-#[path = "tidy/module_graph.rs"]
 mod module_graph;
 
 /// The allowed dependencies: each crate with the workspace crates and restricted libraries it may use.

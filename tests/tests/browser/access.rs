@@ -2,7 +2,7 @@
 
 use serde_json::json;
 
-use crate::support::{Area, Button, Rig};
+use crate::browser::support::{Area, Button, Rig};
 
 /// Counts the controls that are visible and match a condition on `one` and its rectangle `box`.
 fn controls(rig: &Rig, condition: &str) -> f64 {

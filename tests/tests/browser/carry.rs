@@ -1,6 +1,6 @@
 //! Carrying: a solid or an anchor follows the mouse, and a solid that is let go in motion glides on.
 
-use crate::support::{Button, Rig, State, distance};
+use crate::browser::support::{Button, Rig, State, distance};
 
 /// A ball in front of the eye, and two particles on an anchor, without gravity.
 const SCENE: &str = "

@@ -3,7 +3,7 @@
 
 use serde_json::json;
 
-use crate::support::{Rig, Tab};
+use crate::browser::support::{Rig, Tab};
 
 /// A chain of two compliant constraints with a weight of 1 kg at each, and a weight on a rigid one.
 const CHAIN: &str = "

@@ -5,8 +5,8 @@ use integration_tests::{DEADLINE, wait_for};
 use serde_json::json;
 use viewer_bridge::scene::catalog::Catalog;
 
-use crate::picture::SWINGING;
-use crate::support::{Button, Rig};
+use crate::browser::picture::SWINGING;
+use crate::browser::support::{Button, Rig};
 
 /// Particle of the drape near a corner of its hem, which sways by 11 cm with each gust.
 const HEM: usize = 23 * 49 + 47;

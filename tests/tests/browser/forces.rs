@@ -7,7 +7,7 @@ use integration_tests::{Process, Program, Sandbox, wait_for};
 use serde_json::Value;
 use sim_contract::Client;
 
-use crate::support::{Button, ReplayRig, Rig, Tab, is_force};
+use crate::browser::support::{Button, ReplayRig, Rig, Tab, is_force};
 
 /// A sheet of 9 x 8 particles that hangs from its upper row, above a floor that it does not reach.
 const HANGING: &str = "

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use serde_json::{Value, json};
 
-use crate::support::{Button, Rig, Tab};
+use crate::browser::support::{Button, Rig, Tab};
 
 /// A pendulum of a pinned and a free particle, and a free one that falls beside it.
 const SCENE: &str = "

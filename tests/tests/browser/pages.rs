@@ -1,6 +1,6 @@
 //! Sliders, links, and several pages of one simulation.
 
-use crate::support::{Button, Rig};
+use crate::browser::support::{Button, Rig};
 
 /// Particle of the curtain that the tests grab: row 6, column 6.
 const TARGET: usize = 90;

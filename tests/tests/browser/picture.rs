@@ -4,7 +4,9 @@
 use integration_tests::ctl;
 use serde_json::json;
 
-use crate::support::{Area, Camera, Picture, Rig, distance, is_cloth, is_particle, is_pin};
+use crate::browser::support::{
+    Area, Camera, Picture, Rig, distance, is_cloth, is_particle, is_pin,
+};
 
 /// A sheet that swings, because gravity is not parallel to it.
 pub(crate) const SWINGING: &str = "

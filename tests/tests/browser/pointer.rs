@@ -4,7 +4,7 @@ use integration_tests::{DEADLINE, ctl, wait_for};
 use serde_json::json;
 use sim_contract::{ParticleFlags, ParticleState};
 
-use crate::support::{Area, Button, Rig, State, distance, is_cloth, is_grab_mark};
+use crate::browser::support::{Area, Button, Rig, State, distance, is_cloth, is_grab_mark};
 
 /// Particle of the curtain that the tests grab: row 6, column 6.
 const TARGET: usize = 90;

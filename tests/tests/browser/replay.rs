@@ -5,8 +5,8 @@ use std::path::Path;
 use integration_tests::{Process, Program, Sandbox, ctl, record, wait_for};
 use recorder::{FrameReader, LogReader};
 
-use crate::picture::{ERROR_MAX, NAMED, SWINGING, errors};
-use crate::support::{Area, Button, ReplayRig, is_cloth, is_ghost};
+use crate::browser::picture::{ERROR_MAX, NAMED, SWINGING, errors};
+use crate::browser::support::{Area, Button, ReplayRig, is_cloth, is_ghost};
 
 /// A view in which the swinging sheet stays within the picture.
 const VIEW: &str = "show.particles=1&camera=0.5,-0.35,0,3,0.42,0.16";

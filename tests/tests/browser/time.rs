@@ -3,7 +3,7 @@
 
 use integration_tests::{Signal, wait_for};
 
-use crate::support::{Rig, is_cloth};
+use crate::browser::support::{Rig, is_cloth};
 
 #[test]
 #[ignore = "needs Chromium"]
@@ -28,7 +28,7 @@ fn pause_freezes_the_picture_step_advances_it_and_reset_restores_it() {
     assert_ne!(rig.tab.hash(), frozen);
 
     rig.tab.key('r');
-    let positions = |state: &crate::support::State| {
+    let positions = |state: &crate::browser::support::State| {
         state.particles.iter().map(|one| one.position).collect::<Vec<_>>()
     };
     let wanted = positions(&start);

@@ -9,7 +9,7 @@ use integration_tests::{Process, Program, Sandbox, Signal, Stream, Streams, wait
 use serde_json::Value;
 use sim_contract::{Client, Endpoint, NAME_DEFAULT};
 
-use crate::real_time::{SCHED_OTHER, thread_state};
+use crate::pace::real_time::{SCHED_OTHER, thread_state};
 
 const REFERENCE: &str = include_str!("../../../sim-node/contract/README.md");
 

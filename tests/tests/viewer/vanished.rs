@@ -6,8 +6,8 @@ use serde_json::json;
 use sim_contract::Client as Node;
 
 use crate::foxglove_client::Client;
-use crate::page::{Bridge, Page};
-use crate::{is_grabbed, wait_for_particle};
+use crate::viewer::page::{Bridge, Page};
+use crate::viewer::{is_grabbed, wait_for_particle};
 
 /// Particles that a page and a Foxglove client grab.
 const PAGE_PARTICLE: usize = 90;

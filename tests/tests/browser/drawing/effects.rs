@@ -2,7 +2,7 @@
 //! renderer of these tests, and turned on by the address. Each test compares a page with effects and one
 //! without, of the same paused state.
 
-use crate::support::{Area, Camera, Picture, Rig, Tab, is_cloth};
+use crate::browser::support::{Area, Camera, Picture, Rig, Tab, is_cloth};
 
 /// A sheet over a part of another one, and a floor under both.
 const SHEETS: &str = "

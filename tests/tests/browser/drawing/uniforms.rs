@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use crate::support::{Rig, Tab};
+use crate::browser::support::{Rig, Tab};
 
 /// A sheet over a floor, with two pins to which forces belong.
 const SHEET: &str = "

@@ -2,7 +2,7 @@
 
 use integration_tests::ctl;
 
-use crate::support::{Button, Rig, State, Tab};
+use crate::browser::support::{Button, Rig, State, Tab};
 
 /// Shows the last kept state at or before a step, as the slider of the timeline does.
 fn look(tab: &Tab, step: u64) {

@@ -3,7 +3,7 @@
 use integration_tests::ctl;
 use serde_json::json;
 
-use crate::support::{Button, Rig, State};
+use crate::browser::support::{Button, Rig, State};
 
 /// Checks that a later state has the same particles, bit for bit.
 fn is_like(wanted: &State) -> impl Fn(&State) -> bool {

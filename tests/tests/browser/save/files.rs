@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use crate::support::{Rig, Tab};
+use crate::browser::support::{Rig, Tab};
 
 /// Keeps what the page saves instead of downloading it.
 pub(super) const KEEP_FILES: &str = "void (() => { window.saved = []; const make = URL.createObjectURL; \

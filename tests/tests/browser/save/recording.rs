@@ -2,7 +2,7 @@
 
 use integration_tests::{Process, Program, Signal};
 
-use crate::support::{Button, Rig, Tab};
+use crate::browser::support::{Button, Rig, Tab};
 
 /// Waits for a condition on the element with an id.
 fn wait_for(tab: &Tab, id: &str, condition: &str) {

@@ -3,7 +3,7 @@
 use serde_json::json;
 
 use super::files::{KEEP_FILES, LOOK, RAMP, coloured, size};
-use crate::support::Rig;
+use crate::browser::support::Rig;
 
 #[test]
 #[ignore = "needs Chromium"]

@@ -8,7 +8,7 @@ use integration_tests::{DEADLINE, Process, Program, Sandbox, ctl, wait_for};
 use recorder::{FrameReader, LogReader, Message};
 use sim_contract::{Action, Change, Client, ColliderState, ParameterValues, Tap};
 
-use crate::files::steps;
+use crate::recording::files::steps;
 
 /// A cloth that falls onto a ball. A node publishes a keyframe each second: every 60 steps.
 const SCENE: &str = r#"

@@ -1,13 +1,5 @@
 //! Crowds of connections that never become clients: they keep no newcomer out and disturb no client,
 //! even if the bridge has few file descriptors.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a panic is how a test fails")]
-
-#[path = "../../../viewer-bridge/tests/sockets/foxglove_client.rs"]
-#[allow(dead_code, reason = "its other half is used by the tests that have no node")]
-mod foxglove_client;
-#[path = "../viewer/page.rs"]
-#[allow(dead_code, reason = "its other half is used by the tests of the viewer")]
-mod page;
 
 use std::io::{Read, Write};
 use std::net::TcpStream;
@@ -19,8 +11,8 @@ use integration_tests::{Process, Program, Sandbox, allow_many_open_files, wait_f
 use tungstenite::WebSocket;
 use viewer_bridge::limits::{HEAD_SIZE_BYTES_MAX, MESSAGE_SIZE_BYTES_MAX, VISITORS_MAX};
 
-use foxglove_client::{Client, connect};
-use page::{Bridge, Page};
+use crate::foxglove_client::{Client, connect};
+use crate::viewer::page::{Bridge, Page};
 
 /// A node, and a bridge for pages and Foxglove clients.
 struct Setup {

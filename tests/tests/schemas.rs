@@ -1,10 +1,6 @@
 //! Other programs can open what we write and serve: every schema follows the rules of viewers of the
 //! Foxglove protocol, and every row follows its schema.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a panic is how a test fails")]
 
-#[path = "../../../viewer-bridge/tests/sockets/foxglove_client.rs"]
-#[allow(dead_code, reason = "its other half is used by other tests")]
-mod foxglove_client;
 mod rules;
 mod validation;
 
@@ -16,7 +12,7 @@ use recorder::{LogReader, MessageEncoder, Topic, TopicFormat};
 use serde_json::{Value, json};
 use sim_contract::Action;
 
-use foxglove_client::Client;
+use crate::foxglove_client::Client;
 use rules::broken_rules;
 use validation::violations;
 

@@ -1,6 +1,5 @@
 //! Processes under adversity: flooding and killed clients, requests to stop, streams that refuse
 //! output, and shared memory that is full or cut.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 mod cut_memory;
 mod fairness;

@@ -1,6 +1,5 @@
 //! When a node makes its next step: after a long wait, beside a load, in lockstep with other processes, and
 //! with the scheduling of the system; and `sim-node bench`, which measures that.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 mod bench;
 mod distant_step;

@@ -1,13 +1,9 @@
 //! The server of the viewer, end to end: pages receive the state that the node publishes, and their
 //! commands show in the snapshots of the node.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a panic is how a test fails")]
 
 mod carry;
-#[path = "../../../viewer-bridge/tests/sockets/foxglove_client.rs"]
-#[allow(dead_code, reason = "its other half is used by the tests that have no node")]
-mod foxglove_client;
 mod ghost;
-mod page;
+pub(crate) mod page;
 mod recording;
 mod replay;
 mod vanished;

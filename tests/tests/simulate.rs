@@ -1,5 +1,4 @@
 //! Simulations of recordings, by the built programs.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 mod changes;
 mod diff;

@@ -1,6 +1,5 @@
 //! The examples in Rust, C and C++ and the README's commands work against a running node, and report errors
 //! as text.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a panic is how a test fails")]
 
 mod bodies;
 mod c_and_cpp;

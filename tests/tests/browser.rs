@@ -1,12 +1,6 @@
 //! The page in a real browser, with the built node and bridge. The tests send mouse, touch and key
 //! events, and check the snapshots of the node and the pixels of the page. An error of a page fails
 //! its test. No speed is asserted.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    reason = "a panic is how a test fails"
-)]
 
 mod access;
 mod carry;

@@ -1,5 +1,4 @@
 //! The recorder as a process: recordings of live nodes, simulations and playbacks, and bad input.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 mod bad_input;
 mod coverage;
