@@ -1,6 +1,5 @@
 //! The complete state of any step of a recording is that of a solver that has made the steps itself, also
 //! between recorded snapshots, and a recording that does not lead to it is an error.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by it")]
 
 use std::fs;
 use std::path::PathBuf;

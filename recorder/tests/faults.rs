@@ -1,6 +1,5 @@
 //! Recordings on a disk that fails: errors, short writes and a full disk, at random places. A recording
 //! is never complete unless everything is in it, and it is readable up to the failure.
-#![allow(clippy::unwrap_used, reason = "a test fails by it")]
 
 use std::cell::RefCell;
 use std::io::{self, BufWriter, ErrorKind, Write};

@@ -1,7 +1,6 @@
 //! Recordings read back as they were written, and unreadable files are named.
 //!
 //! Small recordings are built in memory, then truncated, damaged or replaced.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test fails by it")]
 
 use std::io::{Cursor, Read};
 

@@ -2,7 +2,6 @@
 //! without.
 //!
 //! Small recordings are written to files, then truncated and damaged.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by it")]
 
 use std::fs;
 use std::path::PathBuf;

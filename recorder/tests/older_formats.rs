@@ -1,6 +1,5 @@
 //! Files of older recorders and of other programs: those of format 2 are read, and files without a
 //! run are named. They are written here record by record.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by it")]
 
 use std::io::Cursor;
 

@@ -3,7 +3,6 @@
 //!
 //! The tests simulate a scene with cuts, resets and colliders, write it in small chunks, and keep the
 //! states of the solver for comparison.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by it")]
 
 use std::fs;
 use std::path::PathBuf;

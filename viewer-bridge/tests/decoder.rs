@@ -1,6 +1,5 @@
 //! The decoders of messages from clients, on any bytes: they never panic, and what passes them is in
 //! range. An independent reader (JSON values) gives the ranges of what was sent.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a panic is how a test fails")]
 
 use proptest::collection::vec;
 use proptest::prelude::*;

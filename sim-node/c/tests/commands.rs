@@ -1,6 +1,5 @@
 //! Each function that makes a command makes the one of its name, and a bad argument makes the empty command,
 //! which no node receives.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use std::ptr::null;
 

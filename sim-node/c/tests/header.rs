@@ -1,6 +1,5 @@
 //! The header is generated from the Rust types, and compiles as C99 and as C++17 without a warning. To
-//! update it after a change: `UPDATE_GOLDEN=1 cargo test -p sim-c --test header`
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
+//! update it after a change: `UPDATE_GOLDEN=1 cargo test -p sim-c --test integration header`
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -220,7 +219,7 @@ fn the_committed_header_is_that_of_the_rust_types() {
     let differs = committed.lines().zip(header.lines()).find(|(old, new)| old != new);
     assert!(
         committed == header,
-        "run UPDATE_GOLDEN=1 cargo test -p sim-c --test header; first difference: {differs:?}"
+        "run UPDATE_GOLDEN=1 cargo test -p sim-c --test integration header; first difference: {differs:?}"
     );
 }
 

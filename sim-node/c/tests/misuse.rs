@@ -1,18 +1,15 @@
 //! Mistakes of a C program are results and never end the process; what it holds stays valid.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
-
-mod support;
 
 use std::ffi::CString;
 use std::mem::MaybeUninit;
 use std::ptr::{null, null_mut};
 use std::{slice, thread};
 
+use crate::support::*;
 use catenary::*;
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::testing::TestDomain;
 use sim_contract::{Command, Outcome, Owner, Reason, Wake};
-use support::*;
 
 fn assert_misuse(result: CatenaryResult, part: &str) {
     assert_eq!(result, CatenaryResult::Misuse);

@@ -1,12 +1,10 @@
 //! Whatever a node publishes and answers reaches a C program byte for byte.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a panic is how a test fails")]
-
-mod support;
 
 use std::ffi::{CStr, c_char};
 use std::mem::MaybeUninit;
 use std::{slice, thread};
 
+use crate::support::*;
 use catenary::*;
 use sim_contract::testing::TestDomain;
 use sim_contract::{
@@ -14,7 +12,6 @@ use sim_contract::{
     Outcome, Owner, ParameterValues, ParticleState, SnapshotHeader, TearsHeader, TornConstraint,
     Triangle, Wake,
 };
-use support::*;
 
 /// A function of the library that reads.
 type Read<T> = extern "C" fn(*mut ClientHandle, f64, Option<&mut MaybeUninit<T>>) -> CatenaryResult;

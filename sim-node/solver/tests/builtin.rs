@@ -1,5 +1,4 @@
 //! The built-in scenes: they have the counts of the tutorials, and move as their names say.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use sim_solver::{ColliderGeometry, Scene, Solver, builtin};
 

@@ -1,5 +1,4 @@
 //! Effects of commands on the state. A rejected command changes no bit.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use sim_solver::{Grab, Particle, ParticleFlags, Reason, Scene, Solver, builtin};
 use sim_types::{Action, CLIENT_ID_END};

@@ -1,6 +1,5 @@
 //! The same scene and commands give the same bits, in one run or restored in the middle from a
 //! snapshot and a keyframe.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use proptest::prelude::*;
 use sim_solver::{

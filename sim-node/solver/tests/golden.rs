@@ -1,7 +1,6 @@
 //! The bits of this solver version against the stored ones. They may change only together with the
 //! solver's version and a line in the CHANGELOG. A recording of another version is refused, not
 //! re-simulated.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use std::num::NonZero;
 

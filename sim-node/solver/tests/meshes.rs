@@ -1,6 +1,5 @@
 //! Meshes from OBJ text: a plane, a sphere and a tube become cloth, or colliders; degenerate parts are
 //! omitted with a warning.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use sim_solver::scene::{Mesh, NameRun};
 use sim_solver::{Scene, SceneError, Solver};

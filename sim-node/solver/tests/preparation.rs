@@ -1,6 +1,5 @@
 //! Constraints and contacts that are prepared beside a solver: the same bits as without, whatever happens between the
 //! plan and the command, and whatever the spare was used for before.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use sim_solver::{
     Action, Keyframe, Parameter, ParameterValue, Particle, Prepared, Scene, Solver, Spare,

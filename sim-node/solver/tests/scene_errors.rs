@@ -1,6 +1,5 @@
 //! Errors in scenes: each names the line, the field, what is wrong and what is allowed, in the words
 //! of this program. The cases are in `scenes/errors.txt`.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use sim_solver::Scene;
 use sim_types::{COLLIDERS_MAX, SCENE_SIZE_BYTES_MAX};

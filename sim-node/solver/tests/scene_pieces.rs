@@ -1,6 +1,5 @@
 //! Long texts of scenes, which are parsed in pieces: they give the same scenes and the same errors as
 //! short ones. The same text is read twice, with short and with long comments where it can be divided.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use sim_solver::scene::{Generator, Pinned, Shape};
 use sim_solver::{Scene, SceneError, builtin};

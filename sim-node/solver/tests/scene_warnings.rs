@@ -1,5 +1,4 @@
 //! Warnings about scenes that work, but probably not as intended.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use sim_solver::Scene;
 

@@ -1,6 +1,5 @@
 //! Scenes: counts of the built-in scenes and of shapes, the round trip through TOML, and the ranges of
 //! parameters.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use sim_solver::scene::SceneCounts;
 use sim_solver::{Parameter, Scene, SceneError, Solver, builtin};

@@ -2,7 +2,6 @@
 //!
 //! The work is substeps x (constraints x iterations + particles x (colliders + 1)). The scenes have
 //! counts whose work is one above or exactly at a bound, computed by hand.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use std::fmt::Write as _;
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -12,7 +12,7 @@ use viewer_bridge::sink::Update;
 use viewer_bridge::wire::Format::{F32, U16};
 use viewer_bridge::wire::{Message, Scene, frame_flag};
 
-use crate::support::{Site, wait_for};
+use crate::sockets::support::{Site, wait_for};
 
 /// Limit on the wait for a request of a page.
 const REQUEST_TIMEOUT: Duration = Duration::from_mins(1);

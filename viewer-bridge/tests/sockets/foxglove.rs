@@ -19,8 +19,8 @@ use viewer_bridge::{
     Shutdown, Sinks,
 };
 
-use crate::foxglove_client::{Binary, Client, connect};
-use crate::support::{allow_many_open_files, state, wait_for};
+use crate::sockets::foxglove_client::{Binary, Client, connect};
+use crate::sockets::support::{allow_many_open_files, state, wait_for};
 
 /// A running Foxglove server. Dropping it ends the server.
 pub(crate) struct FoxgloveSite {

@@ -9,12 +9,12 @@ use viewer_bridge::limits::MESSAGE_SIZE_BYTES_MAX;
 use viewer_bridge::request::RequestKind;
 use viewer_bridge::sink::Update;
 
-use crate::foxglove::{FoxgloveSite, options};
-use crate::foxglove_client::{Client, connect};
-use crate::raw_socket::{
+use crate::sockets::foxglove::{FoxgloveSite, options};
+use crate::sockets::foxglove_client::{Client, connect};
+use crate::sockets::raw_socket::{
     BINARY, CLOSE, CONTINUATION, FIN, PING, RawSocket, TEXT, frame, panic_count, watch_panics,
 };
-use crate::support::{Site, wait_for};
+use crate::sockets::support::{Site, wait_for};
 
 const HELLO: &[u8] = br#"{"type":"hello","protocol":2}"#;
 const FOXGLOVE: &[&str] = &["Sec-WebSocket-Protocol: foxglove.sdk.v1"];

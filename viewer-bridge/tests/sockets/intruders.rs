@@ -6,7 +6,7 @@ use viewer_bridge::TokenDemand;
 use viewer_bridge::limits::VISITORS_MAX;
 use viewer_bridge::sink::Update;
 
-use crate::support::{Site, wait_for};
+use crate::sockets::support::{Site, wait_for};
 
 #[test]
 fn a_socket_of_a_foreign_page_is_refused() {

@@ -11,7 +11,7 @@ use viewer_bridge::message::Level;
 use viewer_bridge::request::RequestKind;
 use viewer_bridge::sink::Update;
 
-use crate::support::{Site, wait_for};
+use crate::sockets::support::{Site, wait_for};
 
 #[test]
 fn a_first_message_other_than_hello_ends_the_connection() {

@@ -6,7 +6,7 @@ use std::sync::Once;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
-use crate::support::wait_for;
+use crate::sockets::support::wait_for;
 
 /// Opcodes of frames.
 pub(crate) const CONTINUATION: u8 = 0;

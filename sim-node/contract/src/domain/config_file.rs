@@ -70,7 +70,7 @@ pub(crate) fn to_text(config: &Config) -> String {
     let Config { global, defaults, .. } = config;
     let (services, events) = (&defaults.publish_subscribe, &defaults.event);
     format!(
-        r#"[global]
+        r"[global]
 root-path = {:?}
 prefix = {:?}
 
@@ -97,7 +97,7 @@ publisher-history-size = {}
 max-notifiers = {}
 max-listeners = {}
 max-nodes = {}
-"#,
+",
         root::path(config).to_string_lossy(),
         global.prefix.to_string(),
         global.creation_timeout.as_secs(),

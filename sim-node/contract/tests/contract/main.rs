@@ -1,5 +1,10 @@
 //! The guarantees of the crate. Each file states what it proves and how.
-#![allow(clippy::unwrap_used, reason = "an error fails the test, also in helpers")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "an error fails the test, also in helpers"
+)]
 
 mod commands;
 mod forces;
@@ -7,6 +12,7 @@ mod late_joiner;
 mod layout;
 mod load;
 mod ownership;
+mod part_file;
 mod readers;
 mod services_page;
 mod states;

@@ -5,7 +5,7 @@ use sim_solver::{
 };
 use sim_types::{KindFilter, Text};
 
-use crate::{bits, particles, step};
+use crate::physics::{bits, particles, step};
 
 /// Five blocks with bends, and explicit bends between them.
 const SCENE: &str = include_str!("../../scenes/bends.toml");

@@ -3,7 +3,9 @@
 use sim_solver::{Bend, BendShape, ParameterValue, Solver};
 
 use super::{energy, momenta};
-use crate::{assert_at_most, assert_close, assert_near, particles, position, solver, step};
+use crate::physics::{
+    assert_at_most, assert_close, assert_near, particles, position, solver, step,
+};
 
 /// A mesh of triangles.
 #[derive(Clone)]

@@ -5,7 +5,7 @@ use sim_solver::{
     BodyMotion, ColliderGeometry, Kernels, ParameterValue, Pose, Reason, Scene, Solver,
 };
 
-use crate::{assert_at_most, assert_close, assert_near, bits, rates, solver};
+use crate::physics::{assert_at_most, assert_close, assert_near, bits, rates, solver};
 
 const GRAVITY: DVec3 = DVec3::new(0.0, -9.81, 0.0);
 

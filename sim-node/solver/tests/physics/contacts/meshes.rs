@@ -3,7 +3,7 @@
 use sim_solver::{Pose, Scene, Solver};
 
 use super::mesh::{Mesh, turned};
-use crate::{
+use crate::physics::{
     assert_at_most, assert_close, assert_near, particles, position, rates, solver, step, stepped,
     velocity,
 };

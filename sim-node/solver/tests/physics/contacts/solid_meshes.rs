@@ -3,7 +3,7 @@
 use sim_solver::{BodyMotion, Keyframe, Pose, Solver};
 
 use super::mesh::Mesh;
-use crate::{
+use crate::physics::{
     assert_at_most, assert_near, particles, position, rates, solver, step, stepped, velocity,
 };
 
@@ -190,7 +190,7 @@ fn a_restored_state_in_a_solid_goes_on_with_the_same_bits() {
 
 fn assert_restores(text: &str) {
     let mut solver = stepped(text, 3);
-    let mut copy = crate::solver(text);
+    let mut copy = crate::physics::solver(text);
     for steps in [1, 5, 40] {
         let keyframe = Keyframe::decode(&solver.keyframe().encode()).unwrap();
         copy.restore(&particles(&solver).collect::<Vec<_>>(), &keyframe).unwrap();

@@ -2,7 +2,7 @@
 
 use sim_solver::{Push, Reason, Solver, Sphere, Sweep, TearCause};
 
-use crate::{assert_near, bits, position, solver, step, velocity};
+use crate::physics::{assert_near, bits, position, solver, step, velocity};
 
 /// A net of 5 x 4 particles, 1 m apart, in the xy plane. Particle (c, r) is at (c, -r, 0).
 const NET: &str = "gravity = [0, 0, 0]\n[solver]\nrate_hz = 100\nsubsteps = 1\n[[generate]]\nshape = \"cloth\"\n\

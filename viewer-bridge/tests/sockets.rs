@@ -1,6 +1,5 @@
 //! The server over real sockets: access control, delivery, and clients that are slow, silent or too
 //! talkative. There is no node: the tests feed the hub.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a panic is how a test fails")]
 
 mod delivery;
 mod foxglove;

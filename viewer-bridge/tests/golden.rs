@@ -2,7 +2,6 @@
 //! the binary messages, `texts.json` the texts. The decoder of the page is tested on them too.
 //!
 //! `UPDATE_GOLDEN=1` rewrites the files; review the difference.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a panic is how a test fails")]
 
 mod texts;
 

@@ -1,7 +1,6 @@
 //! Every kernel and every number of threads gives the bits of the reference, which projects the
 //! constraints one after another and treats sheets and crowds as graphs: on every scene, at every size around
 //! that of a vector, and with every property of a constraint.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 mod crowds;
 
@@ -74,12 +73,12 @@ fn kernels_agree_on_every_built_in_scene() {
 #[test]
 fn kernels_agree_on_scenes_with_every_mechanism() {
     for text in [
-        include_str!("../scenes/everything.toml"),
-        include_str!("../scenes/stiffness.toml"),
-        include_str!("../scenes/touching.toml"),
-        include_str!("../scenes/surfaces.toml"),
-        include_str!("../scenes/draped.toml"),
-        include_str!("../scenes/bends.toml"),
+        include_str!("scenes/everything.toml"),
+        include_str!("scenes/stiffness.toml"),
+        include_str!("scenes/touching.toml"),
+        include_str!("scenes/surfaces.toml"),
+        include_str!("scenes/draped.toml"),
+        include_str!("scenes/bends.toml"),
     ] {
         assert_same_bits(text, "test", 300);
     }

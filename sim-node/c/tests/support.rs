@@ -1,5 +1,4 @@
 //! A node of a test, and the calls that its C program makes.
-#![allow(dead_code, reason = "each test program uses a part")]
 
 use std::ffi::{CStr, CString, c_char};
 use std::mem::MaybeUninit;

@@ -1,5 +1,4 @@
 //! A file gets its name only when it is finished, and nothing is replaced without permission.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test fails by it")]
 
 use std::fs;
 use std::io::Write;

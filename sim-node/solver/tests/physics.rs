@@ -1,6 +1,5 @@
 //! The physics against closed forms and invariants, which are known without running the solver. Each
 //! comparison prints the expected value, the actual value and the tolerance.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a panic is how a test fails")]
 #![allow(
     clippy::print_stdout,
     reason = "the values of a comparison, for a person who runs the test"
