@@ -21,7 +21,7 @@ pub use sandbox::Sandbox;
 pub use streams::{Stream, Streams};
 pub use wait::{DEADLINE, Deadline, wait_for};
 
-/// Compiles the programs in the README.
+/// Compiles the program on the page for Rust.
 #[cfg(doctest)]
-#[doc = include_str!("../../README.md")]
-struct ReadmeDoctests;
+#[doc = include_str!("../../docs/rust-and-c.md")]
+struct DocsDoctests;

@@ -9,6 +9,11 @@ use recorder::Topic;
 use sim_contract::PARAMETERS;
 
 const README: &str = include_str!("../../README.md");
+const FIRST_STEPS: &str = include_str!("../../docs/first-steps.md");
+const ROBOTICS: &str = include_str!("../../docs/robotics.md");
+const GAMES: &str = include_str!("../../docs/games.md");
+const RUST_AND_C: &str = include_str!("../../docs/rust-and-c.md");
+const TEACHING: &str = include_str!("../../docs/teaching.md");
 const SCENES: &str = include_str!("../../sim-node/scenes/README.md");
 const SOLVER: &str = include_str!("../../sim-node/solver/README.md");
 const CONTRACT: &str = include_str!("../../sim-node/contract/README.md");
@@ -52,7 +57,7 @@ fn allowed(error: &str) -> Vec<&str> {
 fn every_scene_in_a_document_is_accepted_without_a_warning_and_runs() {
     let sandbox = Sandbox::new();
     let mut count = 0;
-    for (name, document) in [("readme", README), ("scenes", SCENES), ("solver", SOLVER)] {
+    for (name, document) in [("teaching", TEACHING), ("scenes", SCENES), ("solver", SOLVER)] {
         for (line, text) in blocks(document, "toml") {
             let scene = sandbox.write(&format!("{name}-line-{line}.toml"), &text);
             let checked = Process::run(Program::SimNode, &sandbox, &["check", "--json", &scene]);
@@ -67,8 +72,8 @@ fn every_scene_in_a_document_is_accepted_without_a_warning_and_runs() {
 }
 
 #[test]
-fn the_program_in_the_readme_checks_the_outcome_of_its_command() {
-    let programs = blocks(README, "rust,no_run");
+fn the_program_for_rust_checks_the_outcome_of_its_command() {
+    let programs = blocks(RUST_AND_C, "rust,no_run");
     assert_eq!(programs.len(), 1);
     let (_, after) = programs[0].1.split_once(".request(").unwrap();
     assert!(after.contains(".is_applied()"), "a rejection is an outcome, not an error");
@@ -164,11 +169,22 @@ fn the_tables_of_topics_name_those_that_exist() {
     }
 }
 
+/// Returns the commands of a document: its blocks of `sh`, and the first cells of its tables, each with its line.
+fn commands(document: &str) -> Vec<(usize, String)> {
+    let rows = (1..).zip(document.lines());
+    let cells = rows.filter_map(|(line, row)| {
+        let (cell, _) = row.strip_prefix("| `")?.split_once('`')?;
+        Some((line, cell.to_owned()))
+    });
+    blocks(document, "sh").into_iter().chain(cells).collect()
+}
+
 #[test]
 fn every_option_in_the_commands_of_a_document_exists() {
     let sandbox = Sandbox::new();
+    let documents = [README, FIRST_STEPS, ROBOTICS, GAMES, RUST_AND_C, TEACHING, RECORDER, VIEWER];
     let mut count = 0;
-    for (line, text) in [README, RECORDER, VIEWER].iter().flat_map(|one| blocks(one, "sh")) {
+    for (line, text) in documents.into_iter().flat_map(commands) {
         for command in text.lines() {
             let mut words = command.split('#').next().unwrap().split_whitespace();
             let program = match words.next() {

@@ -74,13 +74,10 @@ def test_a_controller_pulls_a_point_to_its_height(start_node: StartNode) -> None
     assert float(distance) < 10
 
 
-def test_the_python_of_the_readme_runs_beside_the_curtain(start_node: StartNode) -> None:
-    """The lines `python FILE` and the blocks of Python, in their order."""
+def test_the_python_on_the_page_for_robotics_runs_beside_the_curtain(start_node: StartNode) -> None:
     start_node("curtain")
-    readme = (REPOSITORY / "README.md").read_text()
-    for file in re.findall(r"^python (\S+\.py)", readme, re.MULTILINE):
-        assert "mm from its height" in run(REPOSITORY / file)
-    blocks = re.findall(r"^```python\n(.*?)^```", readme, re.MULTILINE | re.DOTALL)
+    page = (REPOSITORY / "docs" / "robotics.md").read_text()
+    blocks = re.findall(r"^```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
     assert len(blocks) == 1
     for block in blocks:
         done = subprocess.run(
@@ -88,6 +85,31 @@ def test_the_python_of_the_readme_runs_beside_the_curtain(start_node: StartNode)
         )
         assert done.returncode == 0, done.stderr
         assert float(done.stdout.replace("]", " ").split()[-1]) > 0.29, "it arrived"
+
+
+def test_the_python_of_the_first_steps_reads_the_node_and_the_recording(
+    start_node: StartNode, tmp_path: Path
+) -> None:
+    """The lines `python3 -c '...'`, beside the node and the recording of the page."""
+    start_node("drape")
+    with catenary.Simulation("drape", record=str(tmp_path / "run.mcap")) as simulation:
+        simulation.step(24)
+    page = (REPOSITORY / "docs" / "first-steps.md").read_text()
+    programs = re.findall(r"^python3 -c '([^']*)'", page, re.MULTILINE)
+    outputs = [
+        subprocess.run(
+            [sys.executable, "-c", program],
+            cwd=tmp_path,
+            capture_output=True,
+            check=True,
+            text=True,
+            timeout=DEADLINE,
+        ).stdout
+        for program in programs
+    ]
+    assert len(outputs) == 2
+    assert len(outputs[0].strip(" []\n").split()) == 3, "the mean of x, y and z"
+    assert outputs[1].endswith(", 1176, 3)\n")
 
 
 def test_a_tray_carries_its_cloth(start_node: StartNode) -> None:

@@ -1,9 +1,13 @@
-//! The commands of the README's ten-minute paths, and of the class on a pendulum, work as printed, one after the other, in one folder,
-//! beside a node as another path leaves it.
+//! The commands of the pages in `docs`, and of the class on a pendulum, work as printed, one after the other, in one folder.
 
 use integration_tests::{Finished, Process, Program, Sandbox};
 
-const README: &str = include_str!("../../../README.md");
+const FIRST_STEPS: &str = include_str!("../../../docs/first-steps.md");
+const ROBOTICS: &str = include_str!("../../../docs/robotics.md");
+const GAMES: &str = include_str!("../../../docs/games.md");
+const RUST_AND_C: &str = include_str!("../../../docs/rust-and-c.md");
+const TEACHING: &str = include_str!("../../../docs/teaching.md");
+const INDEX: &str = include_str!("../../../docs/README.md");
 const CLASS: &str = include_str!("../../../examples/pendulum/README.md");
 
 /// Runs the examples of the contract as the test has built them.
@@ -12,25 +16,21 @@ const CARGO: &str = r#"cargo() {
     "$PROGRAMS/examples/$6" "${@:8}"
 }"#;
 
-/// A path of the README, in a folder of its own, beside a node.
-struct TenMinutes {
+/// A page with commands, in a folder of its own.
+struct Page {
     text: &'static str,
     left_out: &'static [&'static str],
-    _node: Process,
     sandbox: Sandbox,
 }
 
-impl TenMinutes {
-    fn new(heading: &str) -> Self {
-        let (_, text) = README.split_once(&format!("\n## Ten minutes for {heading}\n")).unwrap();
-        Self::of(text.split("\n## ").next().unwrap(), &[])
+impl Page {
+    fn new(text: &'static str) -> Self {
+        Self { text, left_out: &[], sandbox: Sandbox::new() }
     }
 
     /// Leaves out the commands with these beginnings.
-    fn of(text: &'static str, left_out: &'static [&'static str]) -> Self {
-        let sandbox = Sandbox::new();
-        let node = Process::start_ready(Program::SimNode, &sandbox, &["run", "pendulum"]);
-        Self { text, left_out, _node: node, sandbox }
+    fn without(self, left_out: &'static [&'static str]) -> Self {
+        Self { left_out, ..self }
     }
 
     /// Returns the contents of the fenced blocks of a language.
@@ -39,7 +39,8 @@ impl TenMinutes {
         parts.filter_map(move |part| part.strip_prefix(language)?.strip_prefix('\n'))
     }
 
-    /// Runs all commands, except those in Python, which its own tests run. Returns what they printed.
+    /// Runs all commands, except those in Python, which its own tests run. Returns what they printed. Programs that run
+    /// until Ctrl-C end with the page, the last one first, or before the command that comes after that Ctrl-C.
     fn run(&self) -> Vec<(&'static str, String)> {
         let lines = self.blocks("sh").flat_map(str::lines);
         let lines = lines.map(|line| line.split_once("  # ").unwrap_or((line, "")));
@@ -47,24 +48,23 @@ impl TenMinutes {
             !command.starts_with("python")
                 && !self.left_out.iter().any(|one| command.starts_with(one))
         });
-        let mut recorder = None;
-        let done = lines.map(|(command, comment)| {
+        let mut running = Vec::new();
+        let mut done = Vec::new();
+        for (command, comment) in lines {
             let command = command.trim_end();
             if comment.contains("in a terminal of its own, until Ctrl-C") {
-                recorder = Some(self.start(command, "recording from step "));
-                return (command, String::new());
+                running.push(self.start(command));
+                continue;
             }
             if comment.contains("after that Ctrl-C") {
-                recorder.take().map(Process::interrupt).unwrap().success();
+                running.pop().map(Process::interrupt).unwrap().success();
             }
-            if command.starts_with("viewer-bridge ") {
-                // Another program of this host may have the port.
-                let command = command.replace(":8081", ":0");
-                return ("viewer-bridge", self.start(&command, "ready").interrupt().success());
-            }
-            (command, self.run_command(command))
-        });
-        done.collect()
+            done.push((command, self.run_command(command)));
+        }
+        for process in running.into_iter().rev() {
+            process.interrupt().success();
+        }
+        done
     }
 
     fn run_command(&self, command: &str) -> String {
@@ -76,11 +76,19 @@ impl TenMinutes {
         stdout
     }
 
-    /// Starts a program, and waits for its line.
-    fn start(&self, command: &str, line: &str) -> Process {
+    /// Starts a program that runs until Ctrl-C, and waits until it is ready.
+    fn start(&self, command: &str) -> Process {
+        let is_viewer = command.starts_with("viewer-bridge");
+        let is_recorder = command.starts_with("recorder");
+        // Another program of this host may have the port.
+        let command = if is_viewer && !command.contains(":8081") {
+            format!("{command} --listen 127.0.0.1:0")
+        } else {
+            command.replace(":8081", ":0")
+        };
         let script = self.script(&format!("exec {command}"));
         let mut process = Process::start(Program::Bash, &self.sandbox, &["-e", "-c", &script]);
-        process.wait_for_line(line);
+        process.wait_for_line(if is_recorder { "recording from step " } else { "ready" });
         process
     }
 
@@ -102,9 +110,21 @@ fn printed<'a>(done: &'a [(&str, String)], start: &str) -> &'a str {
 }
 
 #[test]
-fn the_path_for_robotics_grabs_records_proves_and_compares() {
-    let path = TenMinutes::new("robotics and simulation");
-    let done = path.run();
+fn the_first_steps_grab_record_and_prove() {
+    let done = Page::new(FIRST_STEPS).run();
+    assert!(printed(&done, "sim-node ctl nearest").starts_with("particle 1175 "));
+    assert!(printed(&done, "recorder verify run.mcap").contains("bit-identical"));
+    assert_eq!(printed(&done, "recorder export run.mcap --png").lines().count(), 8);
+}
+
+#[test]
+fn the_index_has_no_commands_of_its_own() {
+    assert_eq!(Page::new(INDEX).blocks("sh").count(), 0, "move them to a page that is followed");
+}
+
+#[test]
+fn the_page_for_robotics_grabs_records_proves_and_compares() {
+    let done = Page::new(ROBOTICS).run();
     assert!(printed(&done, "sim-node ctl nearest").starts_with("particle 91 "));
     assert!(printed(&done, "recorder info run.mcap").contains("\n/outcomes            3 "));
     assert!(printed(&done, "recorder verify run.mcap").contains("bit-identical"));
@@ -116,19 +136,18 @@ fn the_path_for_robotics_grabs_records_proves_and_compares() {
 }
 
 #[test]
-fn the_path_for_games_brings_a_mesh_in_and_out() {
-    let path = TenMinutes::new("games and effects");
-    std::fs::create_dir(path.sandbox.path("examples")).unwrap();
-    path.sandbox.write("examples/shirt.obj", include_str!("../../../examples/shirt.obj"));
-    let done = path.run();
+fn the_page_for_games_brings_a_mesh_in_and_out() {
+    let page = Page::new(GAMES);
+    page.sandbox.write("shirt.obj", include_str!("../../../examples/shirt.obj"));
+    let done = page.run();
     let frames = printed(&done, "recorder export shirt.mcap --pc2");
     assert!(frames.contains(" frames at 25 per second "), "{frames}");
     assert!(frames.contains(" interpolated between snapshots"), "{frames}");
 }
 
 #[test]
-fn the_path_for_iceoryx2_runs_the_examples_of_the_contract() {
-    let done = TenMinutes::new("iceoryx2 and Rust").run();
+fn the_page_for_rust_runs_the_examples_of_the_contract() {
+    let done = Page::new(RUST_AND_C).run();
     assert_eq!(
         printed(&done, "cargo run --release -p sim-contract --example watch").lines().count(),
         100
@@ -137,18 +156,19 @@ fn the_path_for_iceoryx2_runs_the_examples_of_the_contract() {
 }
 
 #[test]
-fn the_path_for_teaching_checks_and_loads_the_printed_scene() {
-    let path = TenMinutes::new("teaching");
-    path.sandbox.write("my.toml", path.blocks("toml").next().unwrap());
-    let done = path.run();
+fn the_page_for_teaching_checks_and_runs_the_printed_scene() {
+    let page = Page::new(TEACHING);
+    page.sandbox.write("my.toml", page.blocks("toml").next().unwrap());
+    let done = page.run();
     assert!(printed(&done, "sim-node lesson euler").contains("500"));
     assert!(printed(&done, "sim-node check my.toml").starts_with("my: 402 particles, "));
 }
 
 #[test]
 fn the_class_on_a_pendulum_measures_what_its_page_says() {
-    // The node runs already, and nobody looks at a browser.
-    let class = TenMinutes::of(CLASS, &["sim-node run", "viewer-bridge --open"]);
+    // The test runs the node of the class, and nobody looks at a browser.
+    let class = Page::new(CLASS).without(&["sim-node run", "viewer-bridge --open"]);
+    let _node = Process::start_ready(Program::SimNode, &class.sandbox, &["run", "pendulum"]);
     let done = class.run();
     assert!(printed(&done, "sim-node ctl status --energy").contains("J in step "));
     let report = class.blocks("").next().unwrap();
