@@ -52,7 +52,8 @@ impl Page {
         let mut done = Vec::new();
         for (command, comment) in lines {
             let command = command.trim_end();
-            if comment.contains("in a terminal of its own, until Ctrl-C") {
+            let is_viewer = command.starts_with("viewer-bridge");
+            if is_viewer || comment.contains("in a terminal of its own, until Ctrl-C") {
                 running.push(self.start(command));
                 continue;
             }
