@@ -58,7 +58,8 @@ pub fn ctl(sandbox: &Sandbox, args: &[&str]) -> serde_json::Value {
 /// # Panics
 /// If the recorder ends before, or the deadline passes.
 pub fn record(sandbox: &Sandbox, file: &str) -> Process {
-    let mut recorder = Process::start_ready(Program::Recorder, sandbox, &["record", "-o", file]);
+    let mut recorder =
+        Process::start_ready(Program::Recorder, sandbox, &["record", "--lockstep", "-o", file]);
     recorder.wait_for_line("recording from step ");
     recorder
 }

@@ -115,7 +115,7 @@ fn syntax_error(
         }
         () if message == "duplicate key" => duplicate_key(place, span.clone()),
         () if path.is_empty() => ("syntax".to_owned(), syntax_problem(&message)),
-        () if is_list_of_tables(&path) && message.ends_with("expected a sequence") => {
+        () if keys::is_list_of_tables(&path) && message.ends_with("expected a sequence") => {
             let problem =
                 format!("is not a list of tables (allowed: tables with the header [[{path}]])");
             (path, problem)
@@ -132,11 +132,6 @@ fn syntax_problem(message: &str) -> String {
         Some((problem, allowed)) => format!("{problem} (allowed: {allowed})"),
         None => message.to_owned(),
     }
-}
-
-/// Returns `true` for the keys that are lists of tables.
-fn is_list_of_tables(path: &str) -> bool {
-    ["particle", "constraint", "bend", "collider", "anchor", "generate"].contains(&path)
 }
 
 /// From ``unknown field `x`, expected one of `a`, `b` ``.

@@ -7,7 +7,7 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeArray, DeTable, DeValue, Error};
 
-use super::is_list_of_tables;
+use super::keys::is_list_of_tables;
 use super::pieces::Piece;
 
 /// The text of a piece.

@@ -14,6 +14,11 @@ use crate::scene::read::generator::file::FileGenerator;
 use crate::scene::read::settings::FileSolver;
 use crate::scene::read::wind::FileWind;
 
+/// Returns `true` for the keys that are lists of tables.
+pub(super) fn is_list_of_tables(path: &str) -> bool {
+    ["particle", "constraint", "bend", "collider", "anchor", "generate"].contains(&path)
+}
+
 /// Returns the advice for an unknown key: a similar key of this table, the tables that have the key, or a
 /// similar key of another table. Empty without such a key.
 pub(super) fn advice<'a>(key: &str, allowed: impl IntoIterator<Item = &'a str>) -> String {
