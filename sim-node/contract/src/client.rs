@@ -39,7 +39,6 @@ use crate::ports::service::{
     BENDS, COLLIDERS, PARAMETERS, PARTICLES, SCENE, STATUS, SURFACE, ServiceError, TEARS, TOPOLOGY,
 };
 use crate::ports::services::{AttachError, Attachment};
-use crate::ports::session::Values;
 use sim_types::{Action, CLIENT_ID_END};
 
 /// A program's connection to a simulation: reads snapshots, sends commands.
@@ -47,6 +46,7 @@ use sim_types::{Action, CLIENT_ID_END};
 /// Each method connects to its services when it is first called, so a program that only reads takes
 /// no place from the clients that send commands, and vice versa. A client outlives the owner: when a
 /// new owner claims the name, reading continues, with another `run_id` in the headers.
+/// Messages of processes that do not own the name are ignored.
 ///
 /// Timeouts are upper limits. A method that waits returns `None` early if the owner goes meanwhile;
 /// [`Client::is_owner_alive`] distinguishes that from silence.
@@ -145,8 +145,9 @@ impl Client {
     /// A malformed message arrived, the service has no place for another reader, or `/dev/shm` none for
     /// the reader's memory.
     pub fn topology(&mut self, timeout: Duration) -> Result<Option<Topology>, ReadError> {
-        let service = &self.attachment.services.topology;
-        let latch = get_or_create(&mut self.topology, || Latch::create(service, &TOPOLOGY))?;
+        let Attachment { services, source, .. } = &self.attachment;
+        let create = || Latch::create(&services.topology, &TOPOLOGY, source);
+        let latch = get_or_create(&mut self.topology, create)?;
         self.watch.wait_for(&self.attachment, timeout, || {
             Ok(latch.newest(&self.attachment)?.map(|sample| Topology {
                 header: *sample.user_header(),
@@ -160,8 +161,9 @@ impl Client {
     /// # Errors
     /// Same as [`Client::topology`].
     pub fn bends(&mut self, timeout: Duration) -> Result<Option<Bends>, ReadError> {
-        let service = &self.attachment.services.bends;
-        let latch = get_or_create(&mut self.bends, || Latch::create(service, &BENDS))?;
+        let Attachment { services, source, .. } = &self.attachment;
+        let create = || Latch::create(&services.bends, &BENDS, source);
+        let latch = get_or_create(&mut self.bends, create)?;
         self.watch.wait_for(&self.attachment, timeout, || {
             Ok(latch.newest(&self.attachment)?.map(|sample| Bends {
                 header: *sample.user_header(),
@@ -176,8 +178,9 @@ impl Client {
     /// # Errors
     /// Same as [`Client::topology`].
     pub fn surface(&mut self, timeout: Duration) -> Result<Option<Surface>, ReadError> {
-        let service = &self.attachment.services.surface;
-        let latch = get_or_create(&mut self.surface, || Latch::create(service, &SURFACE))?;
+        let Attachment { services, source, .. } = &self.attachment;
+        let create = || Latch::create(&services.surface, &SURFACE, source);
+        let latch = get_or_create(&mut self.surface, create)?;
         self.watch.wait_for(&self.attachment, timeout, || {
             Ok(latch.newest(&self.attachment)?.map(|sample| Surface {
                 header: *sample.user_header(),
@@ -191,8 +194,9 @@ impl Client {
     /// # Errors
     /// Same as [`Client::topology`], or the text is not UTF-8.
     pub fn scene(&mut self, timeout: Duration) -> Result<Option<String>, ReadError> {
-        let service = &self.attachment.services.scene;
-        let latch = get_or_create(&mut self.scene, || Latch::create(service, &SCENE))?;
+        let Attachment { services, source, .. } = &self.attachment;
+        let create = || Latch::create(&services.scene, &SCENE, source);
+        let latch = get_or_create(&mut self.scene, create)?;
         let bytes = self.watch.wait_for(&self.attachment, timeout, || {
             Ok(latch.newest(&self.attachment)?.map(|sample| sample.payload().to_vec()))
         })?;
@@ -209,8 +213,9 @@ impl Client {
     /// # Errors
     /// Same as [`Client::topology`].
     pub fn torn(&mut self, timeout: Duration) -> Result<Torn, ReadError> {
-        let service = &self.attachment.services.tears;
-        let latch = get_or_create(&mut self.tears, || Latch::create(service, &TEARS))?;
+        let Attachment { services, source, .. } = &self.attachment;
+        let create = || Latch::create(&services.tears, &TEARS, source);
+        let latch = get_or_create(&mut self.tears, create)?;
         let torn = self.watch.wait_for(&self.attachment, timeout, || {
             Ok(latch.newest(&self.attachment)?.map(|sample| Torn {
                 header: *sample.user_header(),
@@ -225,8 +230,9 @@ impl Client {
     /// # Errors
     /// Same as [`Client::topology`].
     pub fn parameters(&mut self, timeout: Duration) -> Result<Option<Parameters>, ReadError> {
-        let service = &self.attachment.services.parameters;
-        let latch = get_or_create(&mut self.parameters, || Latch::create(service, &PARAMETERS))?;
+        let Attachment { services, source, .. } = &self.attachment;
+        let create = || Latch::create(&services.parameters, &PARAMETERS, source);
+        let latch = get_or_create(&mut self.parameters, create)?;
         self.watch.wait_for(&self.attachment, timeout, || {
             Ok(latch.newest(&self.attachment)?.map(|sample| Parameters {
                 header: *sample.user_header(),
@@ -241,8 +247,9 @@ impl Client {
     /// # Errors
     /// Same as [`Client::topology`].
     pub fn colliders(&mut self, timeout: Duration) -> Result<Colliders, ReadError> {
-        let service = &self.attachment.services.colliders;
-        let latch = get_or_create(&mut self.colliders, || Latch::create(service, &COLLIDERS))?;
+        let Attachment { services, source, .. } = &self.attachment;
+        let create = || Latch::create(&services.colliders, &COLLIDERS, source);
+        let latch = get_or_create(&mut self.colliders, create)?;
         let colliders = self.watch.wait_for(&self.attachment, timeout, || {
             Ok(latch.newest(&self.attachment)?.map(|sample| Colliders {
                 header: *sample.user_header(),
@@ -261,8 +268,8 @@ impl Client {
     /// # Errors
     /// Same as [`Client::topology`].
     pub fn forces(&mut self, timeout: Duration) -> Result<Option<Forces>, ReadError> {
-        let services = &self.attachment.services;
-        let reader = get_or_create(&mut self.forces, || ForcesReader::create(services))?;
+        let create = || ForcesReader::create(&self.attachment);
+        let reader = get_or_create(&mut self.forces, create)?;
         self.watch.wait_for(&self.attachment, timeout, || reader.newest())
     }
 
@@ -277,8 +284,8 @@ impl Client {
         snapshot: &SnapshotHeader,
         timeout: Duration,
     ) -> Result<Option<Forces>, ReadError> {
-        let services = &self.attachment.services;
-        let reader = get_or_create(&mut self.forces, || ForcesReader::create(services))?;
+        let create = || ForcesReader::create(&self.attachment);
+        let reader = get_or_create(&mut self.forces, create)?;
         let search = self.watch.wait_for(&self.attachment, timeout, || reader.of_step(snapshot))?;
         Ok(match search {
             Some(Search::Found(forces)) => Some(forces),
@@ -291,8 +298,8 @@ impl Client {
     /// # Errors
     /// The service has no place for another reader, or `/dev/shm` none for the reader's memory.
     pub fn status(&mut self, timeout: Duration) -> Result<Option<NodeStatus>, ReadError> {
-        let service = &self.attachment.status;
-        let reader = get_or_create(&mut self.status, || StatusReader::create(service))?;
+        let create = || StatusReader::create(&self.attachment);
+        let reader = get_or_create(&mut self.status, create)?;
         self.watch.wait_for(&self.attachment, timeout, || {
             reader.receive()?;
             Ok(reader.take_unread())
@@ -469,8 +476,8 @@ struct StatusReader {
 }
 
 impl StatusReader {
-    fn create(service: &Values<NodeStatus>) -> Result<Self, ServiceError> {
-        let reader = ValueReader::create(service, &STATUS)?;
+    fn create(attachment: &Attachment) -> Result<Self, ServiceError> {
+        let reader = ValueReader::create(&attachment.status, &STATUS, &attachment.source)?;
         Ok(Self { reader, newest: None, is_unread: false })
     }
 
@@ -496,7 +503,8 @@ fn open_particles<'a>(
     reader: &'a mut Option<SliceReader<ParticleState, SnapshotHeader>>,
     attachment: &Attachment,
 ) -> Result<&'a mut SliceReader<ParticleState, SnapshotHeader>, ServiceError> {
-    get_or_create(reader, || SliceReader::create(&attachment.services.particles, &PARTICLES))
+    let Attachment { services, source, .. } = attachment;
+    get_or_create(reader, || SliceReader::create(&services.particles, &PARTICLES, source))
 }
 
 fn open_commander<'a>(
@@ -515,5 +523,71 @@ fn get_or_create<T, E>(
     match slot {
         Some(value) => Ok(value),
         None => Ok(slot.insert(create()?)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::messages::command::Command;
+    use crate::owner::Owner;
+    use crate::owner::load::Load;
+    use crate::ports::service::OUTCOMES;
+    use crate::ports::session::{Access, Session, Slices};
+    use crate::ports::writer::{Capacity, SliceWriter, ValueWriter};
+    use crate::testing::TestDomain;
+
+    const OWNED: u64 = 7;
+    const FOREIGN: u64 = 8;
+
+    fn create_owner(endpoint: &Endpoint) -> Owner {
+        let header = LoadHeader { run_id: OWNED, ..LoadHeader::default() };
+        Owner::create(endpoint, &Load { header, ..Load::default() }).unwrap()
+    }
+
+    #[test]
+    fn messages_of_processes_that_do_not_own_the_name_are_ignored() {
+        let domain = TestDomain::new();
+        let owner = create_owner(&domain.endpoint());
+        let mut client = Client::attach_as(&domain.endpoint(), 3).unwrap();
+        let sequence = client.send(Action::Pause).unwrap();
+        let session = Session::join(&domain.endpoint()).unwrap();
+        let (capacity, config) = (Capacity { len_max: 1, samples: 2 }, session.config());
+        // One reader for each kind of service.
+        let mut read_nothing = || {
+            assert!(client.next_snapshot(Duration::ZERO).unwrap().is_none());
+            assert_eq!(client.status(Duration::ZERO).unwrap(), None);
+            assert_eq!(client.topology(Duration::ZERO).unwrap(), None);
+            assert_eq!(client.arrived_outcome(sequence).unwrap(), None);
+        };
+        read_nothing();
+
+        // The messages of a writer vanish with it, so the writers live until the end.
+        let service: Slices<ParticleState, SnapshotHeader> =
+            session.slices(&PARTICLES, Access::Open).unwrap();
+        let particles = SliceWriter::create(config, &service, capacity).unwrap();
+        let header = SnapshotHeader { run_id: FOREIGN, ..SnapshotHeader::default() };
+        particles.write(header, |_| ParticleState::default()).unwrap();
+
+        let service: Slices<ConstraintState, LoadHeader> =
+            session.slices(&TOPOLOGY, Access::Open).unwrap();
+        let topology = SliceWriter::create(config, &service, capacity).unwrap();
+        let header = LoadHeader { run_id: FOREIGN, ..LoadHeader::default() };
+        topology.write(header, |_| unreachable!()).unwrap();
+
+        let service = session.values(&STATUS, Access::Open).unwrap();
+        let status = ValueWriter::create(config, &service, &STATUS).unwrap();
+        status.write(NodeStatus { run_id: FOREIGN, ..NodeStatus::default() }).unwrap();
+
+        let service = session.values(&OUTCOMES, Access::Open).unwrap();
+        let outcomes = ValueWriter::create(config, &service, &OUTCOMES).unwrap();
+        let command = Command::new(3, sequence, Action::Pause);
+        outcomes.write(Outcome::new(0, 1, command, Ok(()))).unwrap();
+        read_nothing();
+
+        owner.publish_status(&NodeStatus { run_id: OWNED, ..NodeStatus::default() }).unwrap();
+        owner.refresh();
+        assert_eq!(client.status(Duration::ZERO).unwrap().unwrap().run_id, OWNED);
+        assert_eq!(client.topology(Duration::ZERO).unwrap().unwrap().header.run_id, OWNED);
     }
 }

@@ -5,7 +5,7 @@ use crate::messages::forces::{ForceRow, ForcesHeader};
 use crate::messages::snapshot::SnapshotHeader;
 use crate::ports::reader::{ReadError, SliceReader, SliceSample};
 use crate::ports::service::{FORCES, ServiceError};
-use crate::ports::services::Services;
+use crate::ports::services::Attachment;
 
 /// A reader that keeps the message that it read last.
 #[derive(Debug)]
@@ -23,8 +23,9 @@ pub(crate) enum Search {
 }
 
 impl ForcesReader {
-    pub(crate) fn create(services: &Services) -> Result<Self, ServiceError> {
-        Ok(Self { reader: SliceReader::create(&services.forces, &FORCES)?, kept: None })
+    pub(crate) fn create(attachment: &Attachment) -> Result<Self, ServiceError> {
+        let Attachment { services, source, .. } = attachment;
+        Ok(Self { reader: SliceReader::create(&services.forces, &FORCES, source)?, kept: None })
     }
 
     /// Reads all messages, and returns the last one.

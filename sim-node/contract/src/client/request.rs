@@ -194,14 +194,14 @@ impl OutcomeGaps {
 impl Commander {
     /// Connects to the services. Subscribes to the outcomes first, so that it misses none.
     pub(crate) fn create(attachment: &Attachment, client_id: u64) -> Result<Self, ServiceError> {
-        let services = &attachment.services;
+        let Attachment { services, source, .. } = attachment;
         Ok(Self {
             client_id,
             sequence: 0,
             gaps: OutcomeGaps::default(),
             unanswered: VecDeque::new(),
             answered: VecDeque::new(),
-            outcomes: ValueReader::create(&services.outcomes, &OUTCOMES)?,
+            outcomes: ValueReader::create(&services.outcomes, &OUTCOMES, source)?,
             commands: ValueWriter::create(&services.config, &services.commands, &COMMANDS)?,
         })
     }

@@ -141,23 +141,22 @@ impl Tap {
 
     fn subscribe(attachment: Attachment, member: Option<Member>) -> Result<Self, ServiceError> {
         let attachment = Arc::new(attachment);
-        let (services, source) = (&attachment.services, &attachment.source());
+        let (services, owner) = (&attachment.services, &attachment.source);
         // Fields are evaluated in the order written here.
         let tap = Self {
             listener: listen(&services.wake)?,
-            outcomes: ValueReader::create(&services.outcomes, &OUTCOMES)?.restricted_to(source),
-            status: ValueReader::create(&attachment.status, &STATUS)?.restricted_to(source),
-            colliders: SliceReader::create(&services.colliders, &COLLIDERS)?.restricted_to(source),
-            tears: SliceReader::create(&services.tears, &TEARS)?.restricted_to(source),
-            parameters: SliceReader::create(&services.parameters, &PARAMETERS)?
-                .restricted_to(source),
-            scene: SliceReader::create(&services.scene, &SCENE)?.restricted_to(source),
-            topology: SliceReader::create(&services.topology, &TOPOLOGY)?.restricted_to(source),
-            bends: SliceReader::create(&services.bends, &BENDS)?.restricted_to(source),
-            surface: SliceReader::create(&services.surface, &SURFACE)?.restricted_to(source),
+            outcomes: ValueReader::create(&services.outcomes, &OUTCOMES, owner)?,
+            status: ValueReader::create(&attachment.status, &STATUS, owner)?,
+            colliders: SliceReader::create(&services.colliders, &COLLIDERS, owner)?,
+            tears: SliceReader::create(&services.tears, &TEARS, owner)?,
+            parameters: SliceReader::create(&services.parameters, &PARAMETERS, owner)?,
+            scene: SliceReader::create(&services.scene, &SCENE, owner)?,
+            topology: SliceReader::create(&services.topology, &TOPOLOGY, owner)?,
+            bends: SliceReader::create(&services.bends, &BENDS, owner)?,
+            surface: SliceReader::create(&services.surface, &SURFACE, owner)?,
             forces: None,
-            keyframe: SliceReader::create(&services.keyframe, &KEYFRAME)?.restricted_to(source),
-            particles: SliceReader::create(&services.particles, &PARTICLES)?.restricted_to(source),
+            keyframe: SliceReader::create(&services.keyframe, &KEYFRAME, owner)?,
+            particles: SliceReader::create(&services.particles, &PARTICLES, owner)?,
             assembler: StateAssembler::default(),
             repeats: Repeats::default(),
             arrivals: Arrivals::default(),
@@ -180,9 +179,8 @@ impl Tap {
     ///
     /// [`Change::Forces`]: crate::Change::Forces
     pub fn read_forces(&mut self) -> Result<(), ServiceError> {
-        let source = self.attachment.source();
-        let reader = SliceReader::create(&self.attachment.services.forces, &FORCES)?;
-        self.forces = Some(reader.restricted_to(&source));
+        let Attachment { services, source, .. } = &*self.attachment;
+        self.forces = Some(SliceReader::create(&services.forces, &FORCES, source)?);
         Ok(())
     }
 
@@ -381,6 +379,7 @@ mod tests {
     use crate::ports::domain;
     use crate::ports::domain::owner_lock::OwnerLock;
     use crate::ports::session::{Access, Session, Slices};
+    use crate::ports::source::Source;
     use crate::testing::TestDomain;
 
     fn create_owner(endpoint: &Endpoint, run_id: u64) -> Owner {
@@ -439,8 +438,10 @@ mod tests {
             }
         };
         let mut tap = Tap::attach(&domain.endpoint()).unwrap();
-        let attachment = Attachment::to(&domain.endpoint()).unwrap();
+        let mut attachment = Attachment::to(&domain.endpoint()).unwrap();
         rename(1);
+        let lock = attachment.session.lock_place();
+        attachment.source = Arc::new(Source::new(&attachment.status, lock));
         let mut other = Tap::subscribe(attachment, None).unwrap();
         owner.refresh();
         publish(&owner, 7, 1);

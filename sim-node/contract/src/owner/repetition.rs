@@ -134,7 +134,7 @@ where
     T: Debug + Copy + ZeroCopySend + 'static,
     H: SliceHeader,
 {
-    let reader = SliceReader::create(service, spec)?;
+    let reader = SliceReader::of_every_publisher(service, spec)?;
     writer.refresh();
     reader.newest()
 }
@@ -205,11 +205,11 @@ mod tests {
         // Readers that have received everything, like a tunnel that is there first.
         let session = Session::join(&domain.endpoint()).unwrap();
         let services = Services::access(&session, Access::Open).unwrap();
-        let scene = SliceReader::create(&services.scene, &SCENE).unwrap();
-        let topology = SliceReader::create(&services.topology, &TOPOLOGY).unwrap();
-        let bends = SliceReader::create(&services.bends, &BENDS).unwrap();
-        let surface = SliceReader::create(&services.surface, &SURFACE).unwrap();
-        let tears = SliceReader::create(&services.tears, &TEARS).unwrap();
+        let scene = SliceReader::of_every_publisher(&services.scene, &SCENE).unwrap();
+        let topology = SliceReader::of_every_publisher(&services.topology, &TOPOLOGY).unwrap();
+        let bends = SliceReader::of_every_publisher(&services.bends, &BENDS).unwrap();
+        let surface = SliceReader::of_every_publisher(&services.surface, &SURFACE).unwrap();
+        let tears = SliceReader::of_every_publisher(&services.tears, &TEARS).unwrap();
         refresh_all(&owner);
         let first = topology.next().unwrap().unwrap();
         for is_none in [

@@ -1,6 +1,7 @@
 //! The newest message of a latched service, kept so that it can be read again.
 
 use std::fmt::Debug;
+use std::sync::Arc;
 
 use iceoryx2::prelude::ZeroCopySend;
 
@@ -9,6 +10,7 @@ use crate::ports::reader::{ReadError, SliceReader, SliceSample};
 use crate::ports::service::{ServiceError, ServiceSpec};
 use crate::ports::services::Attachment;
 use crate::ports::session::Slices;
+use crate::ports::source::Source;
 
 /// A reader that keeps its newest message.
 #[derive(Debug)]
@@ -18,8 +20,12 @@ pub(crate) struct Latch<T: Debug + ZeroCopySend + 'static, H: SliceHeader> {
 }
 
 impl<T: Debug + ZeroCopySend + 'static, H: SliceHeader> Latch<T, H> {
-    pub(crate) fn create(service: &Slices<T, H>, spec: &ServiceSpec) -> Result<Self, ServiceError> {
-        Ok(Self { reader: SliceReader::create(service, spec)?, kept: None })
+    pub(crate) fn create(
+        service: &Slices<T, H>,
+        spec: &ServiceSpec,
+        owner: &Arc<Source>,
+    ) -> Result<Self, ServiceError> {
+        Ok(Self { reader: SliceReader::create(service, spec, owner)?, kept: None })
     }
 
     /// Returns the newest message; `None` if none has arrived yet. Then it asks an owner on another host.

@@ -46,7 +46,7 @@ impl Mirror {
     ) -> Result<Option<Self>, ServiceError> {
         check_quality(particles)?;
         let mirror = Self {
-            status: ValueReader::create(status, &STATUS)?,
+            status: ValueReader::of_every_publisher(status, &STATUS)?,
             requests: ValueWriter::create(session.config(), ready, &READY)?,
             heard_ns: AtomicU64::new(0),
             next_request_ns: AtomicU64::new(0),

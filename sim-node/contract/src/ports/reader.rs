@@ -70,16 +70,24 @@ pub(crate) struct SliceReader<T: Debug + ZeroCopySend + 'static, H: SliceHeader>
 }
 
 impl<T: Debug + ZeroCopySend + 'static, H: SliceHeader> SliceReader<T, H> {
-    pub(crate) fn create(service: &Slices<T, H>, spec: &ServiceSpec) -> Result<Self, ServiceError> {
+    /// Reads the messages of the owner, and drops those of other publishers without a trace.
+    pub(crate) fn create(
+        service: &Slices<T, H>,
+        spec: &ServiceSpec,
+        owner: &Arc<Source>,
+    ) -> Result<Self, ServiceError> {
+        let reader = Self::of_every_publisher(service, spec)?;
+        Ok(Self { source: Some(Arc::clone(owner)), ..reader })
+    }
+
+    pub(crate) fn of_every_publisher(
+        service: &Slices<T, H>,
+        spec: &ServiceSpec,
+    ) -> Result<Self, ServiceError> {
         let subscriber = subscribe(service, spec)?;
         let service = service.name().to_string();
         let ServiceSpec { buffered, borrowed, .. } = *spec;
         Ok(Self { subscriber, service, buffered, borrowed, source: None })
-    }
-
-    /// Drops messages of other publishers without a trace.
-    pub(crate) fn restricted_to(self, source: &Arc<Source>) -> Self {
-        Self { source: Some(Arc::clone(source)), ..self }
     }
 
     /// Returns the next message; `None` if all were read.
@@ -149,15 +157,23 @@ pub(crate) struct ValueReader<T: Debug + Copy + ZeroCopySend + 'static> {
 }
 
 impl<T: Debug + Copy + ZeroCopySend + 'static> ValueReader<T> {
-    pub(crate) fn create(service: &Values<T>, spec: &ServiceSpec) -> Result<Self, ServiceError> {
+    /// Reads the messages of the owner, and drops those of other publishers without a trace.
+    pub(crate) fn create(
+        service: &Values<T>,
+        spec: &ServiceSpec,
+        owner: &Arc<Source>,
+    ) -> Result<Self, ServiceError> {
+        let reader = Self::of_every_publisher(service, spec)?;
+        Ok(Self { source: Some(Arc::clone(owner)), ..reader })
+    }
+
+    pub(crate) fn of_every_publisher(
+        service: &Values<T>,
+        spec: &ServiceSpec,
+    ) -> Result<Self, ServiceError> {
         let subscriber = subscribe(service, spec)?;
         let (service, buffered) = (service.name().to_string(), spec.buffered);
         Ok(Self { subscriber, service, buffered, source: None })
-    }
-
-    /// Drops messages of other publishers without a trace.
-    pub(crate) fn restricted_to(self, source: &Arc<Source>) -> Self {
-        Self { source: Some(Arc::clone(source)), ..self }
     }
 
     /// Returns the next value; `None` if all were read.
@@ -254,7 +270,7 @@ mod tests {
         let session = Session::join(&domain.endpoint()).unwrap();
         let service: Slices<TornConstraint, TearsHeader> =
             session.slices(&TEARS, Access::Create).unwrap();
-        let reader = SliceReader::create(&service, &TEARS).unwrap();
+        let reader = SliceReader::of_every_publisher(&service, &TEARS).unwrap();
         let publisher = service.publisher_builder().initial_max_slice_len(2).create().unwrap();
         for count in [3, 2] {
             let mut sample = publisher.loan_slice(2).unwrap();

@@ -203,6 +203,8 @@ pub(crate) struct Attachment {
     pub(crate) status: Arc<Values<NodeStatus>>,
     /// The connection to an owner on another host; `None` for one on this host.
     mirror: Option<Mirror>,
+    /// The processes whose messages count, for all readers of this attachment.
+    pub(crate) source: Arc<Source>,
     // Dropped last: the services belong to its node.
     pub(crate) session: Session,
 }
@@ -242,7 +244,8 @@ impl Attachment {
                 services => {
                     let services = services?;
                     if services.are_received() {
-                        return Ok(Self { services, status, mirror: None, session });
+                        let source = Arc::new(Source::new(&status, lock));
+                        return Ok(Self { services, status, mirror: None, source, session });
                     }
                     session.pause();
                 }
@@ -261,7 +264,8 @@ impl Attachment {
     ) -> Result<Self, AttachError> {
         let Services { particles, ready, .. } = &services;
         if let Some(mirror) = Mirror::connect(&session, &status, particles, ready)? {
-            return Ok(Self { services, status, mirror: Some(mirror), session });
+            let source = Arc::new(Source::new(&status, session.lock_place()));
+            return Ok(Self { services, status, mirror: Some(mirror), source, session });
         }
         let service = session.service_name(&STATUS);
         let detail = format!(
@@ -276,11 +280,6 @@ impl Attachment {
         }
         let nodes = owner_nodes(&self.status, &self.session.lock_place());
         living_process(&self.status, &nodes).or_else(|| self.unlisted_owner(&nodes))
-    }
-
-    /// Returns the processes whose messages count.
-    pub(crate) fn source(&self) -> Arc<Source> {
-        Arc::new(Source::new(&self.status, self.session.lock_place()))
     }
 
     /// Returns `true` if the owner is on another host, behind a tunnel.

@@ -7,6 +7,7 @@ use crate::messages::outcome::Outcome;
 use crate::messages::topology::LoadHeader;
 use crate::ports::latch::Latch;
 use crate::ports::service::TOPOLOGY;
+use crate::ports::services::Attachment;
 use sim_types::{Action, Reason, allowed_indices};
 
 impl Outcome {
@@ -48,8 +49,9 @@ impl Client {
 
     /// Returns the header of the newest topology without a copy of the constraints.
     fn load_header(&mut self, timeout: Duration) -> Option<LoadHeader> {
-        let service = &self.attachment.services.topology;
-        let latch = get_or_create(&mut self.topology, || Latch::create(service, &TOPOLOGY)).ok()?;
+        let Attachment { services, source, .. } = &self.attachment;
+        let create = || Latch::create(&services.topology, &TOPOLOGY, source);
+        let latch = get_or_create(&mut self.topology, create).ok()?;
         let header = self.watch.wait_for(&self.attachment, timeout, || {
             Ok(latch.newest(&self.attachment)?.map(|sample| *sample.user_header()))
         });
