@@ -25,7 +25,7 @@ pub use kept_states::State;
 pub use result::{SimulationResult, StepCount};
 pub use solver_rows::{colliders_row, forces_row, step_row};
 use state_writer::StateWriter;
-pub use state_writer::{begin_log, finish_log};
+pub use state_writer::{begin_log, finish_log, recording_bytes};
 pub use stepped_recording::{SteppedRecording, SteppedRecordingError};
 
 /// The states of a simulation that it does not compute.

@@ -159,6 +159,8 @@ impl Node {
         solver: Solver,
         options: Options,
     ) -> anyhow::Result<Self> {
+        // Before the publisher, which checks that there is memory for the rest.
+        let history = History::new(options.history_bytes, &solver)?;
         let publisher = Publisher::new(endpoint, &scene, &solver, options.every)?;
         let now_ns = monotonic_ns();
         Ok(Self {
@@ -168,7 +170,7 @@ impl Node {
             arrived: Vec::new(),
             grab_connections: GrabConnections::default(),
             lockstep: Lockstep::new(options.lockstep_timeout),
-            history: History::new(options.history_bytes, &solver)?,
+            history,
             job: None,
             disposal: None,
             waiting: None,

@@ -49,7 +49,7 @@ pub(crate) fn run(args: &RunArgs) -> anyhow::Result<()> {
         history_bytes: usize::try_from(args.history.as_u64()).unwrap_or(usize::MAX),
         real_time: args.real_time.options(),
     };
-    scene.check_memory()?;
+    scene.check_memory(scene.published_bytes())?;
     warn(&scene);
     // Building a large scene takes seconds. Until the node owns anything, a signal ends it at once.
     let solver = Solver::new(&scene);

@@ -9,7 +9,8 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use clap::error::ErrorKind;
 use recorder::simulation::{
-    Job, SimulationResult, Start, State, States, StepCount, begin_log, finish_log, simulate,
+    Job, SimulationResult, Start, State, States, StepCount, begin_log, finish_log, recording_bytes,
+    simulate,
 };
 use recorder::{
     ContentSelection, LogEnd, LogOptions, LogReader, OutcomeRow, PartFile, TimedCommand, WriteError,
@@ -191,7 +192,7 @@ fn run_scene(args: &SimulateArgs, steps: u64, stop: &Stop) -> anyhow::Result<Exi
     if let (Some(warning), Some(source)) = (warning_of_late_commands(&job), &args.commands) {
         output::note(&format!("warning: {}: {warning}", printable_line(source)));
     }
-    job.scene.check_memory()?;
+    job.scene.check_memory(args.output.as_ref().map_or(0, |_| recording_bytes(&job.scene)))?;
     let solver = Solver::new(&job.scene);
     run_job(args, &job, States::first(solver), stop)
 }

@@ -13,6 +13,12 @@ use super::frozen::{FrozenParticles, FrozenTracker};
 use super::job::Start;
 use super::solver_rows::{colliders_row, forces_row, new_tears_row, step_row};
 
+/// Returns the memory that the recording of a simulation takes beside its solver, in bytes: for another solver of the scene as
+/// loaded, and for rows and their encoded messages.
+pub fn recording_bytes(scene: &Scene) -> u64 {
+    scene.memory_bytes() + 3 * scene.published_bytes()
+}
+
 /// Starts the recording of a simulation.
 ///
 /// # Errors

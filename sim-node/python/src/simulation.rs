@@ -7,7 +7,7 @@ use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::exceptions::{PyMemoryError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
-use recorder::simulation::{SteppedRecording, apply, colliders_row, forces_row};
+use recorder::simulation::{SteppedRecording, apply, colliders_row, forces_row, recording_bytes};
 use recorder::{Existing, RunDescription, SceneState, bend_state, constraint_state};
 use sim_contract::clock::monotonic_ns;
 use sim_contract::{
@@ -190,7 +190,8 @@ impl Simulation {
         has_forces: bool,
         record: Option<(&Path, Existing)>,
     ) -> PyResult<Self> {
-        scene.check_memory().map_err(|error| PyMemoryError::new_err(error.to_string()))?;
+        let beside_bytes = record.map_or(0, |_| recording_bytes(&scene));
+        scene.check_memory(beside_bytes).map_err(|error| PyMemoryError::new_err(error.to_string()))?;
         let mut solver = Solver::new(&scene);
         solver.compute_forces(has_forces);
         solver.set_threads(threads);

@@ -23,6 +23,7 @@ use crate::scene::definition::anchor::SceneAnchor;
 use crate::scene::definition::contact::ContactMode;
 use crate::scene::definition::settings::{SolverSettings, substep_length};
 use crate::scene::model::Model;
+use crate::scene::{ThreadedScene, check_memory, thread_bytes};
 use crate::state::forces::{Forces, Measured, Measurement};
 use crate::state::hash::state_hash;
 use crate::state::particles::{Particle, Particles};
@@ -173,12 +174,28 @@ impl Solver {
     /// [`THREADS_MAX`](crate::kernels::worker_pool::THREADS_MAX).
     ///
     /// The number changes no bit. A small scene without contacts uses a single thread. The system may grant fewer
-    /// threads; see [`Self::threads`].
+    /// threads, and without the memory for several there is one; see [`Self::threads`].
     pub fn set_threads(&mut self, threads: usize) {
+        let threads = if self.have_threads_memory(threads) { threads } else { 1 };
         if threads != self.store.thread_count() {
             self.store.set_threads(threads);
             self.particle_contacts.set_worker_count(self.store.thread_count());
         }
+    }
+
+    /// Returns `true` if the process can get the memory with which several threads find contacts.
+    fn have_threads_memory(&self, threads: usize) -> bool {
+        let contact_mode = match (self.parameters.contact_thickness, self.contact_mode) {
+            (None, _) => ContactMode::Off,
+            (Some(_), ContactMode::Surfaces) => ContactMode::Surfaces,
+            (Some(_), _) => ContactMode::Particles,
+        };
+        let scene = ThreadedScene {
+            particle_count: self.model.particles.len(),
+            contact_mode,
+            has_meshes: self.colliders.iter().any(|collider| collider.mesh.is_some()),
+        };
+        threads == 1 || check_memory(thread_bytes(scene, threads)).is_ok()
     }
 
     /// Returns the number of threads, the calling one included.

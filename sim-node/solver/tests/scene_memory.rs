@@ -153,6 +153,76 @@ fn a_dense_mesh_is_read() {
     assert!(read(&mesh).is_ok());
 }
 
+/// Checks that the estimate of a scene is at least the memory of its solver, and that without its margin it is at most
+/// 1.6 times as much.
+fn check_estimate(kind: &str, text: &str) {
+    let scene = Scene::from_toml(&format!("version = 1\n{text}"), kind).unwrap();
+    let before = LIVE.get();
+    PEAK.set(before);
+    let mut solver = Solver::new(&scene);
+    solver.step();
+    solver.compute_forces(true);
+    solver.finish_boundary();
+    solver.step();
+    let needed_bytes = (PEAK.get() - before) as u64;
+    let estimate_bytes = scene.memory_bytes();
+    let count = solver.particle_count();
+    let numbers = format!("{kind} of {count} particles: {needed_bytes}, {estimate_bytes} bytes");
+    assert!(estimate_bytes >= needed_bytes, "{numbers}");
+    let without_margin_bytes = (estimate_bytes - (8 << 20)) / 9 * 8;
+    assert!(without_margin_bytes <= needed_bytes * 8 / 5, "{numbers}");
+}
+
+#[test]
+fn the_estimated_memory_of_a_scene_is_at_least_that_of_its_solver_and_not_much_more() {
+    let sheet = |shape: &str, columns: u32, rows: u32| {
+        format!(
+            "[[generate]]\nshape = \"{shape}\"\ncolumns = {columns}\nrows = {rows}\nspacing = 0.01\n"
+        )
+    };
+    let contact = |mode: &str| format!("[contact]\nmode = \"{mode}\"\nthickness = 0.006\n");
+    let rope = |count: u32| {
+        format!(
+            "[[generate]]\nshape = \"rope\"\ncount = {count}\nfrom = [0, 0, 0]\nto = [1, 0, 0]\n"
+        )
+    };
+    let dolls = |count: u32| {
+        let doll = |at: u32| {
+            format!("[[generate]]\nshape = \"ragdoll\"\nheight = 1\norigin = [{at}, 0, 0]\n")
+        };
+        (0..count).map(doll).collect::<String>()
+    };
+    let [particles, surfaces] = ["particles", "surfaces"].map(contact);
+    for size in [3, 20, 130, 400] {
+        check_estimate("a cloth", &sheet("cloth", size, size));
+        check_estimate("a mesh", &sheet("mesh", size, size));
+        check_estimate("a touching cloth", &format!("{particles}{}", sheet("cloth", size, size)));
+        check_estimate("a cloth of surfaces", &format!("{surfaces}{}", sheet("cloth", size, size)));
+        check_estimate("a bent cloth", &format!("{}bending = 1e-4\n", sheet("cloth", size, size)));
+        check_estimate("a rope", &rope(size * size));
+        check_estimate("a touching rope", &format!("{particles}{}", rope(size * size)));
+        check_estimate("ragdolls", &dolls(size * 5));
+        check_estimate("touching ragdolls", &format!("{particles}{}", dolls(size * 5)));
+    }
+    for columns in [2, 3, 9, 17] {
+        check_estimate("a ribbon", &sheet("cloth", columns, 20_000 / columns));
+        let ribbon = sheet("cloth", columns, 20_000 / columns);
+        check_estimate("a touching ribbon", &format!("{particles}{ribbon}"));
+        check_estimate("a ribbon of surfaces", &format!("{surfaces}{ribbon}"));
+    }
+    let cloth = sheet("cloth", 200, 200);
+    for solver in ["tethers = true", "order = \"listed\"", "iterations = 3"] {
+        check_estimate(solver, &format!("[solver]\n{solver}\n{cloth}"));
+    }
+    check_estimate("wind", &format!("[wind]\nvelocity = [1, 0, 0]\ndrag = 1\n{cloth}"));
+    let collider = "[[collider]]\nshape = \"box\"\ncenter = [0, -5, 0]\nhalf_extents = [1, 1, 1]\n";
+    check_estimate(
+        "a body",
+        &format!("{cloth}{collider}body = {{ mass = 1, inertia = [1, 1, 1] }}\n"),
+    );
+    check_estimate("short ropes", &rope(10).repeat(1000));
+}
+
 /// The cloth has 2,000 rows of three groups of particles, above 500 colliders.
 #[test]
 fn forces_take_no_memory_for_rows_and_colliders_that_do_not_touch() {

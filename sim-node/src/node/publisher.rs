@@ -115,6 +115,7 @@ impl Publisher {
         let place =
             LoadPlace { run_id, step: 0, topology_revision: 0, parameters: parameters.clone() };
         let messages = LoadMessages::new(scene, solver);
+        messages.check_memory()?;
         let owner = Owner::create(endpoint, &messages.at(place))?;
         Ok(Self {
             owner,

@@ -18,7 +18,7 @@ use sim_types::STEP_WORK_MAX;
 
 use super::generate::{Generator, Shape};
 use super::mesh::details::FaceDetails;
-use super::model::{Model, Positions};
+use super::model::{Model, ModelSize, Positions};
 use crate::checks::StepSize;
 use anchor::SceneAnchor;
 use bending::SceneBend;
@@ -190,6 +190,7 @@ impl Scene {
         let mut particles = self.room_for_particles();
         self.for_each_particle(&mut |particle| particles.push(particle));
         let mut model = Model::new(self.solver.method, particles);
+        model.reserve(self.model_size());
         for constraint in &self.constraints {
             model.push_explicit(constraint);
         }
@@ -213,6 +214,19 @@ impl Scene {
             first = end;
         }
         model
+    }
+
+    /// Returns the numbers of explicit and generated elements.
+    #[allow(clippy::cast_possible_truncation, reason = "a scene has at most 2^24 of anything")]
+    pub(crate) fn model_size(&self) -> ModelSize {
+        let sum = |count: fn(&Shape) -> u64| {
+            self.generators.iter().map(|one| count(&one.shape)).sum::<u64>() as usize
+        };
+        ModelSize {
+            constraints: self.constraints.len() + sum(Shape::constraint_count),
+            bends: self.bends.len() + sum(Shape::bend_count),
+            triangles: sum(Shape::triangle_count),
+        }
     }
 
     /// Returns the positions of all particles.

@@ -4,6 +4,8 @@ use std::ops::Range;
 
 use thiserror::Error;
 
+use super::memory::check_memory;
+
 /// An error in a scene. Its text is `FILE:LINE: FIELD: what is wrong (allowed: ...)`.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("{label}:{line}: {field}: {problem}")]
@@ -27,6 +29,11 @@ pub(crate) struct Place<'a> {
 }
 
 impl Place<'_> {
+    /// Refuses a text, or a part of it, if the process cannot get the memory to read it.
+    pub(crate) fn check_memory(&self, needed_bytes: u64) -> Result<(), SceneError> {
+        check_memory(needed_bytes).map_err(|error| self.error(0..0, "scene", error.to_string()))
+    }
+
     /// Creates an error at a byte range of the text.
     pub(crate) fn error(&self, span: Range<usize>, field: &str, problem: String) -> SceneError {
         let start = self.text.floor_char_boundary(span.start);

@@ -117,6 +117,16 @@ impl Shape {
 }
 
 impl Shape {
+    /// Returns the number of triangles that the shape expands to.
+    pub(crate) fn triangle_count(&self) -> u64 {
+        match self {
+            Self::Cloth(cloth) | Self::Mesh(cloth) => cloth.triangle_count(),
+            Self::Bridge(bridge) => 2 * bridge.particle_count(),
+            Self::Obj(obj) => obj.triangle_count(),
+            Self::Rope(_) | Self::Web(_) | Self::Ragdoll(_) => 0,
+        }
+    }
+
     /// Returns the number of bends that the shape expands to.
     pub(crate) fn bend_count(&self) -> u64 {
         match self {

@@ -40,6 +40,14 @@ pub(crate) struct Model {
     incidence: OnceLock<Incidence>,
 }
 
+/// Numbers of the elements that refer to particles.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ModelSize {
+    pub(crate) constraints: usize,
+    pub(crate) bends: usize,
+    pub(crate) triangles: usize,
+}
+
 impl Model {
     /// The constraints and bends of each particle. Found once, when forces are first measured.
     pub(crate) fn incidence(&self) -> &Incidence {
@@ -51,6 +59,17 @@ impl Model {
     pub(crate) fn new(method: Method, particles: Vec<SceneParticle>) -> Self {
         let is_without_contact = vec![false; particles.len()];
         Self { particles, is_without_contact, method, ..Self::default() }
+    }
+
+    /// Makes room for exactly these numbers of elements. A list that grows takes up to twice its memory.
+    pub(crate) fn reserve(&mut self, counts: ModelSize) {
+        let ModelSize { constraints, bends, triangles } = counts;
+        self.constraints.reserve_exact(constraints);
+        self.families.reserve_exact(constraints);
+        self.limit_indices.reserve_exact(constraints);
+        self.bends.reserve_exact(bends);
+        self.bend_families.reserve_exact(bends);
+        self.triangles.reserve_exact(triangles);
     }
 
     /// Sets the limits of the constraints that are pushed from now on.

@@ -255,7 +255,8 @@ impl Reader<'_> {
         let positions = scene.particle_count() * size_of::<[f32; 3]>() as u64;
         let size_mib = (positions + file.size_bytes() as u64) >> 20;
         if size_mib <= REFERENCES_MAX_MIB {
-            return Ok(());
+            let model = if scene.contact.lacks_thickness() { scene.model_bytes() } else { 0 };
+            return self.place.check_memory(positions + scene.particle_count() + model);
         }
         let problem = format!(
             "needs {size_mib} MiB for its particles, explicit constraints and anchors while it is \

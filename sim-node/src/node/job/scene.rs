@@ -46,11 +46,14 @@ pub(super) fn load(
         .override_solver(overrides.rate_hz, overrides.substeps)
         .map_err(|problem| Refusal { problem, reason })?;
     scene
-        .check_memory()
+        .check_memory(scene.published_bytes())
         .map_err(|error| Refusal { problem: error.to_string(), reason: Reason::NoEffectHere })?;
     let begins_run = scene.solver.rate_hz != rate_hz;
     let solver = if begins_run { Solver::new(&scene) } else { Solver::new_in_run(&scene) };
     let messages = LoadMessages::new(&scene, &solver);
+    messages
+        .check_memory()
+        .map_err(|error| Refusal { problem: error.to_string(), reason: Reason::NoEffectHere })?;
     preparer
         .prepare(&messages.sizes())
         .map_err(|error| Refusal { problem: error.to_string(), reason: Reason::NoEffectHere })?;

@@ -4,6 +4,7 @@ use sim_contract::{
     BendState, ColliderState, ConstraintState, Load, LoadHeader, ParameterValues, Triangle,
     scene_hash,
 };
+use sim_solver::scene::{NotEnoughMemory, check_memory};
 use sim_solver::{PlacedCollider, Scene, Solver};
 
 /// Run and step of a load.
@@ -15,6 +16,9 @@ pub(super) struct LoadPlace {
     pub(super) topology_revision: u32,
     pub(super) parameters: ParameterValues,
 }
+
+/// Memory of a node that runs, beside what is checked: its threads, their stacks, and what commands allocate.
+const RUNNING_BYTES: u64 = 16 << 20;
 
 /// The messages of a load, which follow from its scene.
 #[derive(Debug)]
@@ -48,6 +52,15 @@ impl LoadMessages {
             collider_count: solver.collider_count(),
             keyframe_size_bytes_max: solver.keyframe_size_bytes_max(),
         }
+    }
+
+    /// Checks that the process can get the memory of the messages, and of a node that runs.
+    ///
+    /// # Errors
+    /// It cannot. An allocation that fails would abort it.
+    pub(in crate::node) fn check_memory(&self) -> Result<(), NotEnoughMemory> {
+        let torn_bytes = size_of_val(&*self.constraints) as u64;
+        check_memory(self.sizes().shared_memory_bytes() + torn_bytes + RUNNING_BYTES)
     }
 
     /// Identifies the scene.

@@ -50,4 +50,9 @@ impl ContactSettings {
     pub fn distance(&self) -> Option<f32> {
         self.thickness.filter(|_| self.mode != ContactMode::Off)
     }
+
+    /// Returns `true` if particles touch each other, and the scene must give the distance.
+    pub(crate) fn lacks_thickness(&self) -> bool {
+        self.mode != ContactMode::Off && self.thickness.is_none()
+    }
 }

@@ -79,6 +79,10 @@ impl Cloth {
         self.links.iter().map(|kind| self.link_count(*kind)).sum()
     }
 
+    pub(super) fn triangle_count(&self) -> u64 {
+        2 * u64::from(self.columns.saturating_sub(1)) * u64::from(self.rows.saturating_sub(1))
+    }
+
     pub(super) fn build_particles(&self, builder: &mut ParticleBuilder<'_>) {
         let places = self.places();
         for row in 0..self.rows {

@@ -93,6 +93,10 @@ impl Obj {
         Hinges::new(&self.vertices, self.triangles())
     }
 
+    pub(super) fn triangle_count(&self) -> u64 {
+        self.faces.iter().map(|face| face.len().saturating_sub(2) as u64).sum()
+    }
+
     fn triangles(&self) -> impl Iterator<Item = [u32; 3]> + '_ {
         self.faces.iter().flat_map(|face| fan(face))
     }

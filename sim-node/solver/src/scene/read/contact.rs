@@ -60,7 +60,7 @@ impl Reader<'_> {
             let problem = "\"surfaces\" needs three dimensions (allowed in two: off, particles)";
             return self.error(place, "contact.mode", problem);
         }
-        if scene.contact.mode == ContactMode::Off || scene.contact.thickness.is_some() {
+        if !scene.contact.lacks_thickness() {
             return Ok(());
         }
         let model = scene.model();

@@ -5,6 +5,7 @@ use std::ops::Range;
 use super::reader::Reader;
 use super::value::{Spanned, Vector, Word};
 use crate::scene::error::SceneError;
+use crate::scene::memory::reading_bytes;
 use crate::scene::mesh::{Mesh, ParsedMesh};
 
 /// The keys of a mesh in a table.
@@ -38,6 +39,9 @@ impl Reader<'_> {
         let name = path.get_ref();
         let text =
             (self.read_file)(name).map_err(|problem| format!("{problem} (allowed: an OBJ file)"));
+        if let Ok(text) = &text {
+            self.place.check_memory(reading_bytes(text.len()))?;
+        }
         match text.and_then(|text| (keys.parse)(&text)) {
             Ok(parsed) => {
                 let warnings = parsed.warnings.iter().map(|warning| format!("{name}: {warning}"));

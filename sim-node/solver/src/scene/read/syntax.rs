@@ -14,6 +14,7 @@ use toml::de::{DeTable, Deserializer};
 
 use super::file_scene::FileScene;
 use crate::scene::error::{Place, SceneError};
+use crate::scene::memory::reading_bytes;
 use document::Document;
 use parse_cost::check_parse_cost;
 use pieces::pieces;
@@ -26,6 +27,7 @@ pub(super) fn parse(place: &Place<'_>) -> Result<FileScene, SceneError> {
         let problem = format!("has {size_bytes} bytes of text (allowed: {SCENE_SIZE_BYTES_MAX})");
         return Err(place.error(0..0, "scene", problem));
     }
+    place.check_memory(reading_bytes(size_bytes))?;
     let mut file = FileScene::default();
     let mut names = Names::default();
     let mut kept_size_bytes = 0;
