@@ -395,8 +395,8 @@ fn contacts_of_shapes_that_all_refuse_them_cause_a_warning() {
 
 #[test]
 fn a_thickness_with_more_neighbours_than_the_solver_remembers_causes_a_warning() {
-    let expected = "contact.thickness: at load, each particle has more than 32 other particles or 128 triangles, on \
-                    average, within";
+    let expected = "contact.thickness: at load, there are more than 32 pairs of particles, each counted once, or 128 \
+                    triangles for each particle, on average, within";
     let contact = |mode: &str, thickness: f32| {
         let sheet = SHEET.replace("columns = 5\nrows = 5", "columns = 24\nrows = 24");
         let contact = format!("[contact]\nmode = \"{mode}\"\nthickness = {thickness}\n");

@@ -2,10 +2,16 @@
 
 use crate::action::Action;
 use crate::limits::STEP_WORK_MAX;
-use crate::parameter::{OffMeaning, PARAMETERS, Parameter, ParameterInfo, ValueForm};
+use crate::parameter::{
+    OffMeaning, PARAMETERS, Parameter, ParameterInfo, ParameterValue, ValueForm,
+};
 use crate::reason::Reason;
-use crate::suggestion::did_you_mean;
+use crate::suggestion::nearest;
 use crate::text::Text;
+
+/// Allowed contact distances, for one that is a number > 0 and was rejected all the same.
+const TOO_MANY_NEIGHBOURS: &str = "a smaller distance; this one has too many neighbours: at load, at most 32 pairs of \
+     particles, each counted once, or 128 triangles for each particle, on average, may be within 1.6 times of it";
 
 impl ParameterInfo {
     /// Returns the allowed values in words.
@@ -46,8 +52,13 @@ impl Action {
     /// Returns the names of all parameters, and the one that the name in this action most likely stands for.
     fn known_parameters(&self) -> String {
         let names = PARAMETERS.map(|info| info.name);
-        let Self::Set { parameter, .. } = self else { return names.join(", ") };
-        format!("{}{}", names.join(", "), did_you_mean(parameter.as_str(), names))
+        let all = names.join(", ");
+        let Self::Set { parameter, .. } = self else { return all };
+        // Callers put these words in parentheses, so they have none.
+        match nearest(parameter.as_str(), names) {
+            Some(name) => format!("{all}; did you mean '{name}'?"),
+            None => all,
+        }
     }
 
     /// Returns the condition of the scene or its state under which this action has an effect, in words, if it was
@@ -95,7 +106,7 @@ impl Action {
 
     fn allowed_ranges(&self) -> Option<String> {
         let values = match self {
-            Self::Set { parameter, constraint_kind, block, collider, .. } => {
+            Self::Set { parameter, value, constraint_kind, block, collider } => {
                 let info = Parameter::from_name(parameter.as_str())?.info();
                 let has_kind = constraint_kind.is_some() && !info.is_per_kind;
                 let kind = if has_kind { ", no kind" } else { "" };
@@ -108,6 +119,13 @@ impl Action {
                 };
                 let has_collider = collider.is_some() && !info.is_per_collider;
                 let collider = if has_collider { ", no collider" } else { "" };
+                if let (Parameter::Contact, ParameterValue::Number(number)) =
+                    (info.parameter, value)
+                    && info.range.contains(*number)
+                    && kind.len() + block.len() + collider.len() == 0
+                {
+                    return Some(TOO_MANY_NEIGHBOURS.to_owned());
+                }
                 let values = info.allowed_values();
                 let work = work(info.parameter);
                 return Some(format!("{values}{work}{kind}{block}{collider}"));
@@ -175,6 +193,23 @@ mod tests {
     }
 
     #[test]
+    fn a_contact_distance_in_its_range_has_too_many_neighbours() {
+        let values = |number| {
+            let (parameter, value) = (Text::cut("contact"), ParameterValue::Number(number));
+            let action = Action::Set {
+                parameter,
+                value,
+                constraint_kind: None,
+                block: None,
+                collider: None,
+            };
+            action.allowed_values(Reason::OutOfRange).unwrap()
+        };
+        assert!(values(0.2).starts_with("a smaller distance; this one has too many neighbours"));
+        assert_eq!(values(-0.2), "a number > 0, or off for none");
+    }
+
+    #[test]
     fn a_kind_for_a_parameter_without_kinds_is_named() {
         let action = Action::Set {
             parameter: Text::cut("damping"),
@@ -195,7 +230,7 @@ mod tests {
             Action::Set { parameter, value, constraint_kind: None, block: None, collider: None };
         let values = action.allowed_values(Reason::UnknownParameter).unwrap();
         assert!(values.starts_with("gravity, damping, "), "{values}");
-        assert!(values.ends_with(" (did you mean 'gravity'?)"), "{values}");
+        assert!(values.ends_with("; did you mean 'gravity'?"), "{values}");
     }
 
     #[test]

@@ -224,8 +224,8 @@ pub(super) fn overfull(scene: &Scene, model: &Model) -> Option<String> {
     let (mode, kernels) = (scene.contact.mode, Kernels::best());
     ParticleContacts::new(model, mode, Some(thickness), kernels).are_overfull().then(|| {
         format!(
-            "contact.thickness: at load, each particle has more than {PAIRS_PER_PARTICLE} other particles or \
-             {NEVER_PER_PARTICLE} triangles, on average, within {} {unit}, {CONNECTED_REACH} times the thickness: some of them repel each other from the first step on; use a \
+            "contact.thickness: at load, there are more than {PAIRS_PER_PARTICLE} pairs of particles, each counted once, or \
+             {NEVER_PER_PARTICLE} triangles for each particle, on average, within {} {unit}, {CONNECTED_REACH} times the thickness: some of them repel each other from the first step on; use a \
              smaller thickness",
             three_digits(f64::from(CONNECTED_REACH * thickness)),
             unit = scene.unit,
