@@ -177,6 +177,18 @@ fn a_path_whose_first_command_is_refused_appends_nothing_to_the_motion_under_way
 }
 
 #[test]
+fn the_outcome_of_a_long_path_is_that_of_its_first_command() {
+    let sandbox = Sandbox::new();
+    let _node = node(&sandbox, &[]);
+    let path = sandbox.path("path.csv");
+    let point = |index| format!("{} 0 {} 0\n", 1 + index, 0.01 * f64::from(index));
+    fs::write(&path, (0..400).map(point).collect::<String>()).unwrap();
+    let outcome = ctl(&sandbox, &["follow", "collider", "1", "--path", &path]);
+    let is_first = outcome["append"].as_bool().is_none_or(|append| !append);
+    assert!(outcome["status"] == "applied" && is_first, "{outcome}");
+}
+
+#[test]
 fn a_late_subscriber_receives_tears_with_causes_and_colliders() {
     let sandbox = Sandbox::new();
     let _node = node(&sandbox, &["--paused"]);

@@ -192,6 +192,13 @@ def test_a_path_whose_first_command_is_refused_appends_nothing_to_the_motion_und
     assert node.mark("end").index == first.index + 2
 
 
+def test_the_outcome_of_a_long_path_is_that_of_its_first_command(start_node: StartNode) -> None:
+    node = start_node("drop-box")
+    outcome = node.follow("collider", 0, [(1 + index, 0.01 * index, 0, 0) for index in range(400)])
+    assert not outcome.command.get("append")
+    assert node.mark("end").index == outcome.index + 100
+
+
 def test_a_wrong_path_names_its_point() -> None:
     wrong: list[tuple[list[list[float]], str]] = [
         ([], r"a path of 0 points \(allowed: 1 to 2048\)"),

@@ -96,7 +96,8 @@ pub(crate) enum CommandVerb {
     /// The file has a point on each line: the time in s after this command, x, y and z, and where it rotates the
     /// quaternion x, y, z, w, separated by commas or spaces. Times ascend. A line that begins with # is a comment. A point
     /// is in m: of a particle relative to the origin of the scene, else relative to the pose at load. The object
-    /// moves linearly from where it is, and stays at the last point. At most 2048 points are on their way.
+    /// moves linearly from where it is, and stays at the last point. At most 2048 points are on their way. Four points
+    /// are a command; the outcome is that of the first command, or of the first one that is rejected.
     #[command(after_help = "Examples:\n  \
         sim-node ctl follow collider 0 --path wave.csv\n  \
         sim-node ctl follow particle 90 --path arc.csv")]
@@ -105,7 +106,9 @@ pub(crate) enum CommandVerb {
     DriveBody(DriveBodyArgs),
     /// Set a parameter of the simulation
     Set(SetArgs),
-    /// Load another scene; the step number continues
+    /// Load another scene
+    ///
+    /// The step number continues, unless the scene has another rate: then a new run begins at step 0.
     #[command(after_help = "Examples:\n  sim-node ctl load rope\n  sim-node ctl load ./my.toml")]
     Load {
         /// Built-in scene, or TOML file that the node can read: a path with / or ending in .toml

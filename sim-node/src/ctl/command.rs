@@ -31,8 +31,8 @@ fn is_false(value: &bool) -> bool {
     !value
 }
 
-/// Sends the commands of a verb, up to the first one that is rejected, and prints the outcome of the last one that was
-/// sent. Waits for the last step of `step`.
+/// Sends the commands of a verb, and prints the outcome of the first one that is rejected, or else of the
+/// first one. Waits for the last step of `step`.
 pub(super) fn send(
     client: &mut Client,
     args: &CtlArgs,
@@ -83,12 +83,13 @@ pub(super) fn send(
 }
 
 /// Sends the first command, and if it is applied the others, which append to its motion: several at a time, because the
-/// outcome of each takes a step. Returns the first outcome that is a rejection, or the last one.
+/// outcome of each takes a step. Returns the first outcome that is a rejection, or else that of the first command, whose step
+/// is the first that shows the motion.
 fn request_all(client: &mut Client, args: &CtlArgs, actions: &[Action]) -> anyhow::Result<Outcome> {
     let (first, others) = actions.split_first().context("there is nothing to send")?;
-    let mut last = client.request(*first, args.timeout())?;
-    if !last.is_applied() {
-        return Ok(last);
+    let begun = client.request(*first, args.timeout())?;
+    if !begun.is_applied() {
+        return Ok(begun);
     }
     for actions in others.chunks(COMMANDS_BUFFERED / 2) {
         let mut sent = Vec::with_capacity(actions.len());
@@ -96,13 +97,13 @@ fn request_all(client: &mut Client, args: &CtlArgs, actions: &[Action]) -> anyho
             sent.push(client.send(*action)?);
         }
         for sequence in sent {
-            last = client.outcome(sequence, args.timeout())?;
-            if !last.is_applied() {
-                return Ok(last);
+            let outcome = client.outcome(sequence, args.timeout())?;
+            if !outcome.is_applied() {
+                return Ok(outcome);
             }
         }
     }
-    Ok(last)
+    Ok(begun)
 }
 
 /// Time between two checks whether a replay has ended.

@@ -108,13 +108,13 @@ class Commands(ABC, Generic[Result]):
         with a quaternion x, y, z, w behind them. Points are as those of `grab` and `move_collider`. Times ascend, up to
         3600 s. The object moves linearly from where it is, and stays at the last point. With `append`, the points
         come after those of the motion under way, and their times count from its beginning. At most 2048 points of all
-        motions are on their way. Four points are a command, in the order given; the result is that of the last one.
+        motions are on their way. Four points are a command, in the order given; the result is that of the first one.
         """
         rows = [[float(number) for number in row] for row in path]
         return self._perform_all(Action.follow(object, index, rows, append))
 
     def _perform_all(self, actions: list[Action]) -> Result:
-        return [self._perform(action) for action in actions][-1]
+        return [self._perform(action) for action in actions][0]
 
     def drive_body(
         self,

@@ -33,10 +33,11 @@ class Node(Commands[Outcome], _catenary.Node):
         outcome = self._perform(actions[0])
         if len(actions) == 1:
             return outcome
+        # The batch raises `Rejected` for the first command that is rejected.
         with self.batch() as batch:
             for action in actions[1:]:
                 batch._perform(action)
-        return batch.outcomes[-1]
+        return outcome
 
     def snapshots(self) -> Iterator[Snapshot]:
         """Yields each snapshot in turn, beginning with the newest one. Ends when the node ends.
