@@ -388,6 +388,7 @@ impl Node {
         if self.progress.is_stepping() {
             self.mark_ns = now_ns;
         }
+        self.warnings.note_dropped(now_ns);
         if self.statistics.end_second(now_ns, self.scene.solver.rate_hz) {
             self.check_files();
             observer(self);
