@@ -193,6 +193,12 @@ fn get_shows_the_parameters_as_they_were_set() {
         table,
         "since step 1\nparameter  constraints  value     unit\ngravity                 0 -1.5 0  m/s²\n"
     );
+    // The curtain has colliders, which are published with their friction.
+    ctl(&sandbox, &["step", "3"]);
+    let step = ctl(&sandbox, &["set", "friction", "0.3"])["step"].as_u64().unwrap();
+    ctl(&sandbox, &["step"]);
+    let friction = run(&sandbox, "ctl get friction").success();
+    assert!(friction.starts_with(&format!("since step {step}\n")), "{friction}");
     let unknown = run(&sandbox, "ctl get colour");
     assert_eq!(unknown.code, Some(2));
     assert!(unknown.stderr.contains("(allowed: gravity, damping, "), "{}", unknown.stderr);

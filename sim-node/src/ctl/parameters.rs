@@ -27,7 +27,12 @@ pub(super) fn print(
         values.time_scale = to_f32(status.time_scale);
     }
     let is_asked = |name: &str| parameter.is_none_or(|parameter| parameter.name() == name);
-    let step = parameters.header.step;
+    // Those of colliders are published with them.
+    let of_colliders_step = match parameter.map(|parameter| parameter.info().is_per_collider) {
+        Some(false) => 0,
+        Some(true) | None => client.colliders(args.timeout())?.header.step,
+    };
+    let step = parameters.header.step.max(of_colliders_step);
     if args.json {
         let mut object = Map::from_iter([("step".to_owned(), step.into())]);
         if let Value::Object(values) = serde_json::to_value(values)? {

@@ -1,5 +1,7 @@
 //! `ctl status`: the state of the node.
 
+use std::time::Duration;
+
 use anyhow::bail;
 use serde::Serialize;
 use sim_contract::{Client, MemberStatus, NodeStatus};
@@ -18,7 +20,8 @@ pub(crate) struct StatusRow {
     pub(crate) paused: bool,
     pub(crate) replay: bool,
     pub(crate) rate_hz: u32,
-    pub(crate) real_time_factor: f64,
+    /// None before the first whole second.
+    pub(crate) real_time_factor: Option<f64>,
     time_scale: f64,
     particles: u32,
     constraints: u32,
@@ -63,7 +66,7 @@ impl StatusRow {
             paused: status.is_paused(),
             replay: status.is_replay(),
             rate_hz: status.rate_hz,
-            real_time_factor: status.real_time_factor,
+            real_time_factor: measured_factor(status),
             time_scale: status.time_scale,
             particles: status.particle_count,
             constraints: status.constraint_count,
@@ -81,6 +84,11 @@ impl StatusRow {
             solve_ns_p99: status.solve_ns_p99,
             lockstep: status.members().iter().map(MemberRow::from).collect(),
         }
+    }
+
+    /// Real-time factor for people; `None` before one has been measured.
+    pub(crate) fn real_time(&self) -> Option<String> {
+        self.real_time_factor.map(|factor| format!("x{factor:.3}"))
     }
 
     /// State for people.
@@ -112,7 +120,7 @@ impl StatusRow {
             ("process", format!("{}, run {}", self.process_id, self.run_id)),
             ("step", format!("{}, {}", self.step, self.state())),
             ("rate", format!("{} Hz, time scale {:.3}", self.rate_hz, self.time_scale)),
-            ("real time", format!("x{:.3}", self.real_time_factor)),
+            ("real time", self.real_time().unwrap_or_else(|| "not measured yet".to_owned())),
             ("particles", format!("{}{frozen}", self.particles)),
             ("constraints", format!("{}, {} torn", self.constraints, self.torn_constraints)),
             ("commands", format!("{}, {} rejected", self.outcomes, self.rejected_commands)),
@@ -127,6 +135,12 @@ impl StatusRow {
         lines.extend(self.lockstep.iter().map(|member| ("lockstep", member.describe())));
         lines
     }
+}
+
+/// Returns the factor of the last whole second; `None` for a node that runs, but has made no step in a whole second.
+fn measured_factor(status: &NodeStatus) -> Option<f64> {
+    let is_measured = status.is_paused() || status.real_time_factor != 0.0;
+    is_measured.then_some(status.real_time_factor)
 }
 
 impl MemberRow {
@@ -147,13 +161,27 @@ struct Report {
     energy: Option<EnergyRow>,
 }
 
+/// Longest wait for the newest snapshot. A node that runs has one.
+const SNAPSHOT_TIMEOUT: Duration = Duration::from_millis(50);
+
+/// Returns the step of the newest snapshot: a node publishes its status only ten times a second.
+fn newest_step(client: &mut Client, status: &NodeStatus) -> u64 {
+    let newest = client.latest_snapshot(SNAPSHOT_TIMEOUT).ok().flatten();
+    let newest = newest.map(|snapshot| *snapshot.header());
+    let step = newest.filter(|header| header.run_id == status.run_id).map(|header| header.step);
+    // A replay can go back.
+    let step = step.filter(|step| status.is_replay() || *step > status.step);
+    step.unwrap_or(status.step)
+}
+
 /// Prints the newest status, and the energy of the newest state if it is asked for.
 pub(super) fn print(client: &mut Client, args: &CtlArgs, has_energy: bool) -> anyhow::Result<()> {
     let Some(status) = client.status(args.timeout())? else {
         bail!("the node published no status within {:?}; is it stopped?", args.timeout());
     };
+    let step = newest_step(client, &status);
     let energy = has_energy.then(|| EnergyRow::read(args)).transpose()?;
-    let report = Report { status: StatusRow::new(&status), energy };
+    let report = Report { status: StatusRow { step, ..StatusRow::new(&status) }, energy };
     if args.json {
         return output::json(&report);
     }
@@ -162,4 +190,23 @@ pub(super) fn print(client: &mut Client, args: &CtlArgs, has_energy: bool) -> an
         output::line(&format!("{key:<14} {value}"))?;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use sim_contract::StatusFlags;
+
+    use super::*;
+
+    #[test]
+    fn a_real_time_factor_is_shown_once_it_is_measured() {
+        let text = |real_time_factor, flags| {
+            let status = NodeStatus { real_time_factor, flags, ..NodeStatus::default() };
+            let lines = StatusRow::new(&status).lines();
+            lines.into_iter().find(|(name, _)| *name == "real time").unwrap().1
+        };
+        assert_eq!(text(0.0, 0), "not measured yet");
+        assert_eq!(text(0.5, 0), "x0.500");
+        assert_eq!(text(0.0, StatusFlags::PAUSED), "x0.000");
+    }
 }

@@ -253,7 +253,7 @@ fn cells(row: &StatusRow) -> [String; COLUMNS.len()] {
         row.step.to_string(),
         row.state().to_owned(),
         format!("{} Hz", row.rate_hz),
-        format!("x{:.3}", row.real_time_factor),
+        row.real_time().unwrap_or_else(|| "-".to_owned()),
         micros(row.solve_ns_p50),
         micros(row.solve_ns_p99),
         row.late_steps.to_string(),

@@ -110,7 +110,7 @@ impl NodeRow {
             paused: Some(row.paused),
             replay: Some(row.replay),
             rate_hz: Some(row.rate_hz),
-            real_time_factor: Some(row.real_time_factor),
+            real_time_factor: row.real_time_factor,
             late_steps: Some(row.late_steps),
             readers: Some(row.readers),
             lockstep: Some(row.lockstep),
