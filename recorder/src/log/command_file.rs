@@ -121,12 +121,16 @@ fn actions(fields: &Map<String, Value>) -> Result<Vec<Action>, FieldError> {
         return Err(missing("kind", &kind_names()));
     };
     let row = ActionFields::ALL.iter().find(|row| name.as_str() == Some(row.kind));
-    let row = row.ok_or_else(|| invalid("kind", &format!("{name} is unknown"), &kind_names()))?;
+    let row = row.ok_or_else(|| {
+        let meant = ActionFields::meant(name.as_str().unwrap_or_default(), []);
+        invalid("kind", &format!("{name} is unknown{meant}"), &kind_names())
+    })?;
     let own = || row.required.iter().chain(row.optional).copied();
     let is_known = |name: &str| own().chain(COMMON_FIELDS).any(|known| known == name);
     if let Some(unknown) = fields.keys().find(|name| !is_known(name)) {
         let allowed: Vec<_> = own().chain(COMMON_FIELDS).collect();
-        let problem = format!("is not a field of {name}");
+        let meant = ActionFields::meant(row.kind, [unknown.as_str()]);
+        let problem = format!("is not a field of {name}{meant}");
         return Err(invalid(unknown, &problem, &allowed.join(", ")));
     }
     for name in own() {
@@ -373,6 +377,8 @@ mod tests {
             r#"{"step":1.5,"kind":"pause"}"#,
             r#"{"step":1,"particle":1}"#,
             r#"{"step":1,"kind":"dance"}"#,
+            r#"{"step":1,"kind":"gab"}"#,
+            r#"{"step":1,"kind":"pin","partcle":1}"#,
             r#"{"step":1,"kind":"pin"}"#,
             r#"{"step":1,"kind":"pin","particle":-1}"#,
             r#"{"step":1,"kind":"pin","particle":1,"colour":"red"}"#,
@@ -405,6 +411,8 @@ mod tests {
         drag.jsonl:2: step: 1.5 is invalid (allowed: whole numbers from 1)
         drag.jsonl:2: kind: is missing (allowed: pin, unpin, grab, move, release, pause, resume, step, reset, push, cut, cut_radius, cut_segment, move_anchor, move_collider, set, load, rewind, restore, mark, drive_body, follow)
         drag.jsonl:2: kind: "dance" is unknown (allowed: pin, unpin, grab, move, release, pause, resume, step, reset, push, cut, cut_radius, cut_segment, move_anchor, move_collider, set, load, rewind, restore, mark, drive_body, follow)
+        drag.jsonl:2: kind: "gab" is unknown (did you mean 'grab'?) (allowed: pin, unpin, grab, move, release, pause, resume, step, reset, push, cut, cut_radius, cut_segment, move_anchor, move_collider, set, load, rewind, restore, mark, drive_body, follow)
+        drag.jsonl:2: partcle: is not a field of "pin" (did you mean 'particle'?) (allowed: particle, step, kind, client_id, sequence, index, status, reason, disconnected, new_run)
         drag.jsonl:2: particle: is missing (allowed: whole numbers 0..=4294967295)
         drag.jsonl:2: particle: -1 is invalid (allowed: whole numbers 0..=4294967295)
         drag.jsonl:2: colour: is not a field of "pin" (allowed: particle, step, kind, client_id, sequence, index, status, reason, disconnected, new_run)

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use sim_contract::{
-    ConstraintKind, GRAB_OVER_S_DEFAULT, KindFilter, MovedObject, PathError, PathPoint, Text,
+    ActionFields, ConstraintKind, GRAB_OVER_S_DEFAULT, KindFilter, MovedObject, PathError, PathPoint, Text,
     read_scene_file,
 };
 use sim_solver::Scene;
@@ -264,8 +264,14 @@ impl Action {
         if let Some(fields) = fields.as_object_mut() {
             fields.retain(|name, _| !ENVELOPE.contains(&name.as_str()));
         }
+        let meant = fields.as_object().map_or_else(String::new, |fields| {
+            let kind = fields.get("kind").and_then(serde_json::Value::as_str).unwrap_or_default();
+            ActionFields::meant(kind, fields.keys().map(String::as_str))
+        });
         let action = serde_json::from_value(fields);
-        action.map(Self).map_err(|error| PyValueError::new_err(format!("not an action: {error}")))
+        action
+            .map(Self)
+            .map_err(|error| PyValueError::new_err(format!("not an action: {error}{meant}")))
     }
 
     fn __repr__(&self) -> String {

@@ -1,5 +1,7 @@
 //! The fields of each kind of action.
 
+use crate::suggestion::did_you_mean;
+
 /// The fields of a kind of action in its JSON form, besides `kind`.
 #[derive(Debug)]
 pub struct ActionFields {
@@ -43,11 +45,35 @@ impl ActionFields {
         Self::new("unknown", &["number"], &[]),
     ];
 
+    /// Returns ` (did you mean 'x'?)` for the first unknown name in the JSON form of an action, its kind or one of its fields,
+    /// or an empty text.
+    pub fn meant<'a>(kind: &str, fields: impl IntoIterator<Item = &'a str>) -> String {
+        let Some(row) = Self::ALL.iter().find(|row| row.kind == kind) else {
+            return did_you_mean(kind, Self::ALL.map(|row| row.kind));
+        };
+        let known = || ["kind"].iter().chain(row.required).chain(row.optional).copied();
+        let unknown = fields.into_iter().find(|name| known().all(|known| known != *name));
+        unknown.map_or_else(String::new, |name| did_you_mean(name, known()))
+    }
+
     const fn new(
         kind: &'static str,
         required: &'static [&'static str],
         optional: &'static [&'static str],
     ) -> Self {
         Self { kind, required, optional }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_misspelt_kind_or_field_is_answered_with_the_nearest_one() {
+        assert_eq!(ActionFields::meant("gab", ["kind"]), " (did you mean 'grab'?)");
+        let partcle = ActionFields::meant("pin", ["kind", "partcle"]);
+        assert_eq!(partcle, " (did you mean 'particle'?)");
+        assert_eq!(ActionFields::meant("pin", ["kind", "particle"]), "");
     }
 }
