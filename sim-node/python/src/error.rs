@@ -81,7 +81,9 @@ pub(crate) fn load_error(error: &LoadError) -> PyErr {
 }
 
 pub(crate) fn recording_error(path: &Path, error: &dyn StdError) -> PyErr {
-    RecordingError::new_err(format!("{}: {}", path.display(), with_causes(error)))
+    // The option of the programs is an argument here.
+    let problem = with_causes(error).replace("use --overwrite", "use overwrite=True");
+    RecordingError::new_err(format!("{}: {problem}", path.display()))
 }
 
 /// Returns the message of an error, followed by those of its causes.

@@ -425,7 +425,7 @@ def test_a_recorded_simulation_can_be_restored_and_proved(tmp_path: Path) -> Non
     assert (recording.last_step, recording[52].hash) == (52, last)
     assert recording[41].hash == state.hash
     assert catenary.verify(path).is_identical
-    with pytest.raises(catenary.RecordingError, match="exists"):
+    with pytest.raises(catenary.RecordingError, match=r"exists \(use overwrite=True to"):
         catenary.Simulation("curtain", record=path)
     catenary.Simulation("curtain", record=path, overwrite=True).close()
     assert catenary.open(path).last_step == 0
@@ -485,6 +485,12 @@ def test_a_falling_particle_follows_the_closed_form() -> None:
         ),
         (lambda: catenary.Action.rewind(), ValueError, "to_step"),
         (lambda: catenary.Action.from_dict({"kind": "pim"}), ValueError, "pim"),
+        (lambda: catenary.Action.from_dict({"kind": "gab"}), ValueError, r"did you mean 'grab'\?"),
+        (
+            lambda: catenary.Action.from_dict({"kind": "pin", "partcle": 1}),
+            ValueError,
+            r"did you mean 'particle'\?",
+        ),
         (lambda: catenary.State(1, b"123", b""), ValueError, "bytes"),
         (lambda: catenary.State(1, b"", b"1234567"), catenary.StateError, "version"),
     ],
