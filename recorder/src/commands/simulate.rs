@@ -113,6 +113,8 @@ pub(crate) fn run(args: &SimulateArgs) -> anyhow::Result<Exit> {
     match args.steps {
         Some(steps) => run_scene(args, steps, &stop),
         None if !is_recording(&args.scene) => {
+            // A wrong scene is the worse mistake.
+            load_scene(&args.scene, &stop)?;
             let text = "a scene needs --steps N; only a recording (ending in .mcap) has steps\n";
             with_usage(&clap::Error::raw(ErrorKind::MissingRequiredArgument, text))
         }

@@ -107,6 +107,9 @@ fn programs_that_need_all_particles_name_the_cure() {
     let refused = recorder(&sandbox, &["simulate", "rope"]);
     assert_eq!(refused.code, Some(2), "{refused:?}");
     assert!(refused.stderr.contains("a scene needs --steps N"), "{refused:?}");
+    let unknown = recorder(&sandbox, &["simulate", "curtian"]);
+    assert_eq!(unknown.code, Some(1), "{unknown:?}");
+    assert!(unknown.stderr.contains("did you mean 'curtain'?"), "{unknown:?}");
 }
 
 #[test]
