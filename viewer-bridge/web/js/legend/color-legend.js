@@ -3,9 +3,10 @@
 import { find, make, sharpContext } from "../ui/dom.js";
 import { readable } from "../ui/format.js";
 import { sceneUnits } from "../ui/units.js";
-import { niceCeiling } from "../geometry/round.js";
+import { niceEnd } from "../geometry/round.js";
 import { HEAT_STOPS, KIND_COLORS } from "../gl/theme.js";
 import { KINDS, strainGains, tensionGains } from "../state/quantity.js";
+import { valueOf } from "../net/messages.js";
 import { shownTexts } from "./legend-text.js";
 import { ValueScan } from "./value-scan.js";
 
@@ -14,10 +15,19 @@ import { ValueScan } from "./value-scan.js";
 
 /** Time between two scans of a moving scene, in ms. */
 const SCAN_INTERVAL_MS = 250;
-/** Least end of an automatic scale of the strain: below it is only rounding. */
-const STRAIN_MIN = 0.002;
-/** Least end of an automatic scale of the speed: a scene at rest is not coloured by its noise. In radii of the scene per second. */
-const SPEED_MIN_RADII = 0.005;
+/** Rounding of a 32-bit coordinate, relative to its size. */
+const FLOAT_ROUNDING = 2 ** -23;
+/** Least length of an automatic scale, in roundings of a value: a scene at rest is not coloured by the rounding of its
+ * positions, which moves a particle by less than one rounding in most substeps. */
+const ROUNDINGS_MIN = 4;
+/** Least length of an automatic scale of the strain: its labels have thousandths of a percent. */
+const STRAIN_MIN = 5e-5;
+/** The scale shrinks once its values have used less than this part of it, for this number of scans (2 s). A value that
+ * swings, as in a flag, reaches its greatest again within that time. */
+const USED_MIN = 0.6;
+const SHRINK_SCANS = 8;
+/** Ends on both sides of 0 that are this equal become equal: the middle of the scale is 0. */
+const EQUAL_SHARE = 0.75;
 /** Ends that a user can choose, in the unit of the quantity. @type {Record<Quantity, number[]>} */
 const ENDS = { strain: [0.01, 0.05, 0.2, 1], tension: [0.1, 1, 10, 100], speed: [0.1, 1, 10], kind: [] };
 /** An end that is smaller than this part of the other one is noise: the scale begins at 0. */
@@ -132,8 +142,10 @@ export class ColorLegend {
     const { frame, scene, topology, speeds } = this.app.simulation;
     if (frame === null || scene === null || topology === null) return;
     if (!scan.isRunning) {
-      if (nowMs - this.begunMs < SCAN_INTERVAL_MS || this.scanned === frame || (this.quantity === "speed" && speeds === null)) return;
+      if (nowMs - this.begunMs < SCAN_INTERVAL_MS || (this.quantity === "speed" && speeds === null)) return;
       this.begunMs = nowMs;
+      // A paused scene is not scanned again, but its scale still shrinks.
+      if (this.scanned === frame) return this.fit();
       this.scanned = frame;
       this.speeds = speeds;
       scan.begin(frame);
@@ -147,17 +159,24 @@ export class ColorLegend {
     const { coloring } = this.app.renderer;
     const { low, high } = this.scan.found ?? { low: 0, high: 0 };
     this.low.follow(-low);
-    this.high.follow(-low > this.least() ? high : Math.max(high, this.least()));
+    this.high.follow(this.low.value > this.least() ? high : Math.max(high, this.least()));
     const scale = scaleOf(this.low.value, this.high.value, this.range.value === "auto" ? null : Number(this.range.value));
     if (coloring.low !== scale.low || coloring.high !== scale.high) this.app.renderer.isDirty = true;
     Object.assign(coloring, scale);
     this.show();
   }
 
-  /** Least end of an automatic scale. */
+  /** Least length of an automatic scale: a few times what rounding can change in a value. */
   least() {
-    if (this.quantity === "strain") return STRAIN_MIN;
-    return this.quantity === "speed" ? SPEED_MIN_RADII * this.app.simulation.radius() : 0;
+    const { simulation } = this.app;
+    const { gainMax, resolution } = this.scan.found ?? { gainMax: 0, resolution: 0 };
+    const rounding = FLOAT_ROUNDING * (Math.hypot(...simulation.middle()) + simulation.radius());
+    if (this.quantity === "speed") {
+      // The solver computes a velocity from the change of a position within a substep.
+      const substeps = Number(valueOf(simulation.parameters?.values ?? null, "substeps", ""));
+      return ROUNDINGS_MIN * rounding * (simulation.node?.rate_hz ?? 0) * substeps;
+    }
+    return Math.max(ROUNDINGS_MIN * Math.max(resolution, rounding * gainMax), this.quantity === "strain" ? STRAIN_MIN : 0);
   }
 
   show() {
@@ -212,15 +231,24 @@ export class ColorLegend {
   }
 }
 
-/** An end of a scale: a round number. It grows at once, and shrinks only when less than a third is used. */
-class ScaleEnd {
+/** An end of a scale: a round number. It grows at once, and shrinks once several scans in a row used little of it. */
+export class ScaleEnd {
   constructor() {
     this.value = 0;
+    /** The number of scans in a row that used little of the scale, and the greatest value in them. */
+    this.scans = 0;
+    this.greatest = 0;
   }
 
   /** @param {number} measured */
   follow(measured) {
-    if (measured > this.value || measured < this.value * 0.3) this.value = measured > 0 ? niceCeiling(measured) : 0;
+    const isLow = measured < this.value * USED_MIN;
+    this.scans = isLow ? this.scans + 1 : 0;
+    this.greatest = isLow ? Math.max(this.greatest, measured) : 0;
+    if (measured > this.value) this.value = niceEnd(measured);
+    if (this.scans < SHRINK_SCANS) return;
+    this.value = niceEnd(this.greatest);
+    this.scans = this.greatest = 0;
   }
 }
 
@@ -231,6 +259,7 @@ class ScaleEnd {
 export function scaleOf(below, above, chosen) {
   const isBelow = below > NOISE_SHARE * above;
   const isAbove = above > NOISE_SHARE * below || !isBelow;
+  if (chosen === null && Math.min(below, above) >= EQUAL_SHARE * Math.max(below, above)) below = above = Math.max(below, above);
   return { low: isBelow ? -(chosen ?? below) : 0, high: isAbove ? chosen ?? (above || 1) : 0 };
 }
 

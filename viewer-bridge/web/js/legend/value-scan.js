@@ -5,8 +5,8 @@ import { valueAt } from "../state/quantity.js";
 
 /** @typedef {import("../net/wire.js").Frame} Frame */
 /** Extremes of the known values; 98 of 100 lie between `low` and `high`, which include 0. `resolution` is what the
- * rounding of the positions can change in a value.
- * @typedef {{ min: number, max: number, low: number, high: number, known: number, count: number, resolution: number }} Extremes */
+ * rounding of the message's positions can change in a value, and `gainMax` the change of a value per unit of length.
+ * @typedef {{ min: number, max: number, low: number, high: number, known: number, count: number, resolution: number, gainMax: number }} Extremes */
 
 /** Values per slice: well below a millisecond. */
 const SLICE = 10_000;
@@ -93,7 +93,7 @@ export class ValueScan {
     if (end < count) return false;
     const { isQuantised, scale } = /** @type {Frame} */ (this.frame);
     const resolution = isQuantised ? Math.hypot(...scale) * this.gainMax : 0;
-    this.found = { min: this.min, max: this.max, low: 0 - this.end(CLASSES, -this.min), high: this.end(0, this.max), known: this.known, count, resolution };
+    this.found = { min: this.min, max: this.max, low: 0 - this.end(CLASSES, -this.min), high: this.end(0, this.max), known: this.known, count, resolution, gainMax: this.gainMax };
     this.frame = null;
     return true;
   }

@@ -5,7 +5,8 @@ import { test } from "node:test";
 import { complianceOf, strainGains, tensionGains, valueAt } from "../../js/state/quantity.js";
 import { ValueScan } from "../../js/legend/value-scan.js";
 import { Topology, FAN_WORDS } from "../../js/state/topology.js";
-import { scaleOf, tensionNote } from "../../js/legend/color-legend.js";
+import { ScaleEnd, scaleOf, tensionNote } from "../../js/legend/color-legend.js";
+import { niceEnd } from "../../js/geometry/round.js";
 import { unitIn, unitsOf } from "../../js/ui/units.js";
 
 /** Constraints along the x axis from particle 0, with given lengths. */
@@ -79,6 +80,27 @@ test("a scale wastes no side that has no values", () => {
   assert.deepEqual(scaleOf(5, 20, 1), { low: -1, high: 1 });
   assert.deepEqual(scaleOf(0, 20, 1), { low: 0, high: 1 });
   assert.deepEqual(scaleOf(0, 0, null), { low: 0, high: 1 });
+  assert.deepEqual(scaleOf(0.1, 0.08, null), { low: -0.1, high: 0.1 }, "0 is in the middle");
+});
+
+test("values fill three quarters of a scale with short ends", () => {
+  assert.deepEqual([0.085, 0.18, 1, 1.21, 23, 0.0081, 0].map(niceEnd), [0.1, 0.2, 1, 1.5, 25, 0.01, 0]);
+  for (let value = 1e-6; value < 1e6; value *= 1.01) assert.ok(niceEnd(value) >= value * 0.999 && value >= 0.74 * niceEnd(value), `${value}`);
+});
+
+test("an end of a scale stays while its values vary, and follows them down within a few scans", () => {
+  const end = new ScaleEnd();
+  const follow = (value, times = 1) => {
+    for (let i = 0; i < times; i++) end.follow(value);
+    return end.value;
+  };
+  assert.deepEqual([follow(0.18), follow(0.22)], [0.2, 0.25]);
+  for (let i = 0; i < 100; i++) assert.equal(follow(0.18 + 0.04 * Math.sin(i)), 0.25);
+  // A swing that comes back within two seconds.
+  follow(0.2);
+  for (let i = 0; i < 5; i++) assert.deepEqual([follow(0.01, 7), follow(0.2)], [0.25, 0.25]);
+  assert.equal(follow(0.012, 8), 0.012);
+  assert.equal(follow(0, 8), 0);
 });
 
 test("a large scene is scanned in slices of one frame, and the rounding of its positions is known", () => {
