@@ -167,8 +167,8 @@ fn the_page_for_teaching_checks_and_runs_the_printed_scene() {
 
 #[test]
 fn the_class_on_a_pendulum_measures_what_its_page_says() {
-    // The test runs the node of the class, and nobody looks at a browser.
-    let class = Page::new(CLASS).without(&["sim-node run", "viewer-bridge --open"]);
+    // The test runs the node of the class.
+    let class = Page::new(CLASS).without(&["sim-node run"]);
     let _node = Process::start_ready(Program::SimNode, &class.sandbox, &["run", "pendulum"]);
     let done = class.run();
     assert!(printed(&done, "sim-node ctl status --energy").contains("J in step "));
