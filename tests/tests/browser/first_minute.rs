@@ -20,6 +20,11 @@ fn the_page_opens_on_something_that_moves_with_a_hint_until_it_is_touched() {
         rig.tab.evaluate("document.querySelector('#hint').textContent"),
         "Drag the cloth. Right-drag cuts it."
     );
+    rig.tab.key('b');
+    rig.tab.wait(
+        "document.querySelector('#hint').textContent.startsWith('Drag over the cloth to push it.')",
+    );
+    rig.tab.key('g');
     // Wherever the hem is, it comes at least half of its way from there within a period of the gusts.
     let first = rig.state().particles[HEM].position[2];
     rig.wait_for_state("the hem to sway", |state| {

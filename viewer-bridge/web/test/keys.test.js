@@ -37,12 +37,20 @@ test("arrows move between the cards of the menu, and stay within it", () => {
 });
 
 test("the hint names what the scene has, and no right button on a touch screen", () => {
-  const hint = (/** @type {string[]} */ ...shapes) => hintText(shapes.map((shape) => ({ shape })), false);
+  const hint = (/** @type {string[]} */ ...shapes) => hintText(shapes.map((shape) => ({ shape })), false, "grab");
   assert.match(hint("cloth", "cloth"), /the cloth.*Right-drag/);
   assert.match(hint("bridge"), /the bridge/);
   assert.match(hint("cloth", "ragdoll"), /anything/);
   assert.match(hint(), /particle/);
-  assert.doesNotMatch(hintText([{ shape: "cloth" }], true), /Right/);
+  assert.doesNotMatch(hintText([{ shape: "cloth" }], true, "grab"), /Right/);
+});
+
+test("the hint says what a press does in the current mode", () => {
+  const hint = (/** @type {import("../js/tools/input.js").Mode} */ mode) => hintText([{ shape: "cloth" }], false, mode);
+  assert.equal(hint("brush"), "Drag over the cloth to push it. Right-drag cuts it.");
+  assert.equal(hint("cut"), "Drag across the cloth to cut it.");
+  assert.match(hint("pin"), /^Click a particle to pin it/);
+  assert.match(hintText([], true, "pin"), /^Tap a particle/);
 });
 
 test("shortcuts that can be turned off are those of a single character", () => {

@@ -57,6 +57,8 @@ export class Input {
     this.longPress = 0;
     /** The press that is a click so far. @type {Pixel | null} */
     this.click = null;
+    /** Called when the mode changes. */
+    this.onMode = () => {};
     /** Called when a tool begins to change the simulation. */
     this.onTouch = () => {};
     /** Number of tools that have begun to change the simulation. */

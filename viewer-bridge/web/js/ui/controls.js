@@ -186,6 +186,7 @@ export class Controls {
     this.input.isHoverStale = true;
     this.input.canvas.dataset.cursor = mode;
     for (const button of this.modes) button.setAttribute("aria-pressed", String(button.dataset.mode === mode));
+    this.input.onMode();
   }
 
   togglePanel() {

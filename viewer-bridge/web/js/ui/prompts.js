@@ -5,14 +5,19 @@ import { find } from "./dom.js";
 /** Names of the shapes of scenes. @type {Record<string, string>} */
 const NAMES = { cloth: "the cloth", rope: "the rope", bridge: "the bridge", web: "the web", ragdoll: "the ragdoll" };
 
-/** Text of the hint. @param {{ shape: string }[]} shapes of the scene @param {boolean} isTouch */
-export function hintText(shapes, isTouch) {
+/** Text of the hint: what a press does in a mode.
+ * @param {{ shape: string }[]} shapes of the scene @param {boolean} isTouch @param {import("../tools/input.js").Mode} mode */
+export function hintText(shapes, isTouch, mode) {
   const kinds = [...new Set(shapes.map((one) => one.shape))];
   const thing = kinds.length === 0 ? "any particle" : kinds.length === 1 ? NAMES[kinds[0]] ?? "it" : "anything";
-  return isTouch ? `Drag ${thing}.` : `Drag ${thing}. Right-drag cuts it.`;
+  const text = {
+    grab: `Drag ${thing}.`, brush: `Drag over ${thing} to push it.`, cut: `Drag across ${thing} to cut it.`,
+    pin: `${isTouch ? "Tap" : "Click"} a particle to pin it, or to remove its pin.`,
+  }[mode];
+  return isTouch || mode === "cut" ? text : `${text} Right-drag cuts${mode === "pin" ? "" : " it"}.`;
 }
 
-/** A hint that disappears for good at the first use of a tool. */
+/** A hint that fades after a while, returns with another mode, and disappears for good at the first use of a tool. */
 export class Hint {
   /** @param {import("../tools/tool.js").App} app @param {import("../tools/input.js").Input} input */
   constructor(app, input) {
@@ -21,9 +26,13 @@ export class Hint {
     const show = () => {
       const { scene, frame } = app.simulation;
       this.element.hidden = this.isTouched || scene === null || frame === null || !input.canChange();
-      if (scene !== null) this.element.textContent = hintText(scene.shapes, matchMedia("(pointer: coarse)").matches);
+      if (scene !== null) this.element.textContent = hintText(scene.shapes, matchMedia("(pointer: coarse)").matches, input.mode);
     };
     for (const topic of /** @type {const} */ (["scene", "frame", "node", "hello", "connection"])) app.simulation.on(topic, show);
+    input.onMode = () => {
+      show();
+      for (const fade of this.element.getAnimations()) fade.currentTime = 0;
+    };
     input.onTouch = () => {
       this.isTouched = true;
       show();
