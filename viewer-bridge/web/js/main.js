@@ -115,6 +115,8 @@ function start(renderer) {
   const undo = new Undo(app, banner);
   const controls = new Controls(app, input, views, timeline, undo);
   const panel = new Panel(find("parameters", HTMLFormElement), find("parameters-note", HTMLElement), app, banner);
+  // In a text field, Ctrl+Z is about values: a cut is undone on the picture.
+  panel.onUndo = () => { if (simulation.undoable === "set") undo.run(); };
   const inspector = new Inspector(app, input, banner);
   controls.onInspect = () => inspector.turn();
   controls.onFollow = () => inspector.toggleFollow();

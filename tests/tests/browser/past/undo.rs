@@ -1,6 +1,6 @@
 //! Undo: cuts, resets and loads by keys, by links and in another rate, and what others have done since.
 
-use integration_tests::ctl;
+use integration_tests::{DEADLINE, ctl, wait_for};
 use serde_json::json;
 
 use crate::browser::support::{Button, Rig, State};
@@ -49,7 +49,7 @@ fn ctrl_z_undoes_a_stroke_of_cuts_and_a_reset_one_after_the_other() {
     notice(&rig, "Undid the cut.");
     rig.tab.wait("viewer.torn === 0 && document.querySelector('#undo').disabled");
 
-    // A text field has its own Ctrl+Z.
+    // A text field undoes changes of values only.
     cut(&rig);
     rig.tab.wait("!document.querySelector('#undo').disabled && viewer.unanswered === 0");
     let count = rig.tab.number("viewer.notices.length");
@@ -58,6 +58,31 @@ fn ctrl_z_undoes_a_stroke_of_cuts_and_a_reset_one_after_the_other() {
     rig.tab.pass_animation_frames(3);
     assert_eq!(rig.tab.number("viewer.notices.length"), count);
     assert_eq!(rig.tab.evaluate("document.querySelector('#undo').disabled"), false);
+}
+
+#[test]
+#[ignore = "needs Chromium"]
+fn ctrl_z_in_the_field_of_a_parameter_undoes_typing_first_and_then_the_change_of_the_node() {
+    let mut rig = Rig::new(&["curtain"], "");
+    let initial = rig.client().parameters(DEADLINE).unwrap().unwrap().values.damping;
+    let field = "input[aria-label='Damping in 1/s']";
+    let shows = |rig: &Rig, text: &str| {
+        rig.tab.wait(&format!("document.querySelector(\"{field}\").value === '{text}'"));
+    };
+    rig.tab.type_into(field, "2.125");
+    rig.tab.wait("viewer.unanswered === 0 && !document.querySelector('#undo').disabled");
+    rig.tab.click(field);
+    shows(&rig, "2.125");
+    rig.tab.key('7');
+    shows(&rig, "7");
+    rig.tab.ctrl_key('z');
+    shows(&rig, "2.125");
+    rig.tab.ctrl_key('z');
+    shows(&rig, &initial.to_string());
+    wait_for("the value of the scene in the node", || {
+        (rig.client().parameters(DEADLINE).unwrap().unwrap().values.damping == initial)
+            .then_some(())
+    });
 }
 
 #[test]

@@ -6,7 +6,7 @@ import { find, make } from "../ui/dom.js";
 import { SLIDER_STEPS, editable, hasBends, partsOf, positionOf, rangeOf, restoring, rowsOf, unitOf, valueAt, vectorOf, withSurfaces } from "./parameters.js";
 import { valueOf } from "../net/messages.js";
 import { unitIn } from "../ui/units.js";
-import { newStroke } from "../tools/tool.js";
+import { Strokes } from "../tools/tool.js";
 import { ValueField } from "./value-field.js";
 
 /** @typedef {import("./parameters.js").Row} Row */
@@ -20,8 +20,6 @@ const AXES = ["x", "y", "z"];
 const OF_COLLIDERS = ["friction", "restitution"];
 /** Wind drag set along with a wind velocity if there is none, as wind has no effect without drag: the default of scenes, in kg/m³. */
 const WIND_DRAG = 0.6;
-/** Changes that follow each other within this time are undone together, in ms: the motion of a slider, or a reset of several rows. */
-const STROKE_MS = 1000;
 
 export class Panel {
   /** @param {HTMLFormElement} form @param {HTMLElement} note @param {import("../tools/tool.js").App} app @param {import("../ui/banner.js").Banner} banner */
@@ -34,14 +32,17 @@ export class Panel {
     this.resetButton = find("parameters-reset", HTMLButtonElement);
     /** Sends the newest unsent value of each parameter and kind. @type {Map<string, () => void>} */
     this.unsent = new Map();
-    /** The number of the last stroke of changes, and the time of its last one. */
-    this.stroke = 0;
-    this.changedMs = -Infinity;
+    this.strokes = new Strokes();
+    /** Called for Ctrl+Z in a text field. */
+    this.onUndo = () => {};
     /** @type {(() => void)[]} */
     this.refreshers = [];
     this.built = "";
     this.surfaces = "";
     form.addEventListener("submit", (event) => event.preventDefault());
+    form.addEventListener("pointerdown", () => this.strokes.press());
+    // The pointer may have left the slider.
+    for (const type of /** @type {const} */ (["pointerup", "pointercancel"])) addEventListener(type, () => this.strokes.release());
     this.resetButton.addEventListener("click", () => this.reset());
     for (const topic of /** @type {const} */ (["hello", "node", "parameters", "scene", "connection"])) simulation.on(topic, () => this.update());
     simulation.on("colliders", () => this.followColliders());
@@ -128,10 +129,8 @@ export class Panel {
   set(name, value, part = "all") {
     const index = OF_COLLIDERS.includes(name) ? "collider" : "block";
     const field = KINDS.includes(part) ? { constraint_kind: part } : part === "all" ? {} : { [index]: Number(part) };
-    const now = performance.now();
-    if (now - this.changedMs > STROKE_MS) this.stroke = newStroke();
-    this.changedMs = now;
-    this.unsent.set(`${name} ${part}`, () => this.commands.run("set", { parameter: name, value, ...field, stroke: this.stroke }, (outcome) => {
+    const stroke = this.strokes.ofChange(performance.now());
+    this.unsent.set(`${name} ${part}`, () => this.commands.run("set", { parameter: name, value, ...field, stroke }, (outcome) => {
       if (outcome.status !== "applied") this.update();
     }));
   }
@@ -147,10 +146,11 @@ export class Panel {
 
   /** @param {Row} row @param {string} label @param {(value: number | null) => void} onValue */
   valueField(row, label, onValue) {
-    return new ValueField(row, label, onValue, (text) => {
+    const onWrong = (/** @type {string} */ text) => {
       const allowed = row.kind === "whole" ? "a whole number" : row.canBeOff ? "a number or off" : "a number";
       this.banner.notify(`${row.label}: “${text}” is not ${allowed}.`, "warning");
-    });
+    };
+    return new ValueField(row, label, { onValue, onWrong, onUndo: () => this.onUndo() });
   }
 
   /** Tells screen readers the value of a slider, instead of its position.

@@ -1,14 +1,15 @@
 // A text field for a value beside its slider.
 
 import { make } from "../ui/dom.js";
+import { keyName } from "../ui/keys.js";
 import { editable, typedValue } from "./parameters.js";
 
 /** @typedef {import("./parameters.js").Row} Row */
 /** @typedef {import("../net/messages.js").ParameterValue} ParameterValue */
 
 export class ValueField {
-  /** @param {Row} row @param {string} label for screen readers @param {(value: number | null) => void} onValue @param {(text: string) => void} onWrong */
-  constructor(row, label, onValue, onWrong) {
+  /** @param {Row} row @param {string} label for screen readers @param {{ onValue: (value: number | null) => void, onWrong: (text: string) => void, onUndo: () => void }} on */
+  constructor(row, label, { onValue, onWrong, onUndo }) {
     this.input = make("input", { type: "text", inputmode: "decimal", class: "value", "aria-label": label, autocomplete: "off", spellcheck: "false" });
     this.shown = "";
     this.input.addEventListener("focus", () => this.input.select());
@@ -18,7 +19,14 @@ export class ValueField {
       onWrong(this.input.value);
       this.input.value = this.shown;
     });
-    this.input.addEventListener("keydown", ({ key }) => {
+    this.input.addEventListener("keydown", (event) => {
+      const { key } = event;
+      // The browser's own undo would show an older value than that of the node.
+      if ((event.ctrlKey || event.metaKey) && key.toLowerCase() === "z") event.preventDefault();
+      if (keyName(event) === "ctrl+z") {
+        if (this.input.value === this.shown) onUndo();
+        else this.input.value = this.shown;
+      }
       // Escape leaves the field without a change.
       if (key === "Escape") this.input.value = this.shown;
       if (key === "Escape" || key === "Enter") this.input.blur();
@@ -27,7 +35,8 @@ export class ValueField {
 
   /** Shows a value, unless the user is typing another one. @param {ParameterValue} value @param {string} [word] in place of "off" */
   show(value, word = "off") {
+    const isTyped = this.input.matches(":focus") && this.input.value !== this.shown;
     this.shown = typeof value === "number" ? editable(value) : word;
-    if (!this.input.matches(":focus")) this.input.value = this.shown;
+    if (!isTyped && this.input.value !== this.shown) this.input.value = this.shown;
   }
 }

@@ -19,6 +19,36 @@ let lastStroke = 0;
 
 export const newStroke = () => ++lastStroke;
 
+/** Changes without a press that follow each other within this time are undone together, in ms: keys on a slider, or a reset of several rows. */
+const STROKE_MS = 1000;
+
+/** The strokes of controls. All changes between a press and its release are one stroke, however long it takes. */
+export class Strokes {
+  constructor() {
+    this.stroke = 0;
+    this.isPressed = false;
+    this.changedMs = -Infinity;
+  }
+
+  press() {
+    this.stroke = newStroke();
+    this.isPressed = true;
+  }
+
+  /** A later change belongs to another stroke. */
+  release() {
+    this.isPressed = false;
+    this.changedMs = -Infinity;
+  }
+
+  /** The number of the stroke of a change. @param {number} nowMs */
+  ofChange(nowMs) {
+    if (!this.isPressed && nowMs - this.changedMs > STROKE_MS) this.stroke = newStroke();
+    this.changedMs = nowMs;
+    return this.stroke;
+  }
+}
+
 /** The drawn particle at a pixel of the picture. @param {App} app @param {Pixel} at @param {number} reach */
 export function particleAt({ simulation, camera, renderer }, at, reach) {
   if (simulation.frame === null) return null;

@@ -3,6 +3,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { isConsumed, keyName } from "../../js/ui/keys.js";
+import { Strokes } from "../../js/tools/tool.js";
 import { reactionTo, undoTitle } from "../../js/ui/undo.js";
 
 const press = (key, rest = {}) => keyName({ key, ctrlKey: false, metaKey: false, altKey: false, shiftKey: false, repeat: false, ...rest });
@@ -13,6 +14,18 @@ test("Ctrl or Cmd and Z undo once per press, and other combinations belong to th
   assert.equal(press("z", { ctrlKey: true, shiftKey: true }), null);
   assert.equal(press("z", { altKey: true }), null);
   assert.deepEqual([press("R"), press("?", { shiftKey: true }), press("ArrowLeft", { repeat: true })], ["r", "?", "ArrowLeft"]);
+});
+
+test("all changes of one press are one stroke, and changes by keys are one if they follow each other", () => {
+  const strokes = new Strokes();
+  strokes.press();
+  const first = strokes.ofChange(0);
+  assert.equal(strokes.ofChange(60_000), first);
+  strokes.release();
+  const byKey = strokes.ofChange(60_001);
+  assert.notEqual(byKey, first);
+  assert.equal(strokes.ofChange(60_900), byKey);
+  assert.notEqual(strokes.ofChange(62_000), byKey);
 });
 
 test("a text field keeps its own Ctrl+Z, a slider and a button do not", () => {
