@@ -1,5 +1,7 @@
 //! Sliders, links, and several pages of one simulation.
 
+use serde_json::json;
+
 use crate::browser::support::{Button, Rig};
 
 /// Particle of the curtain that the tests grab: row 6, column 6.
@@ -42,7 +44,7 @@ fn a_link_asks_before_it_loads_its_scene_and_then_shows_its_view() {
     rig.tab.wait("viewer.scene === 'rope' && viewer.frame >= 0 && viewer.camera.distance === 5");
     let view =
         rig.tab.evaluate("[viewer.camera.yaw, viewer.camera.pitch, viewer.toggles.particles]");
-    assert_eq!(view, serde_json::json!([0.25, 0.5, false]));
+    assert_eq!(view, json!([0.25, 0.5, false]));
     // The link that the page creates has the same view. It asks nothing where its scene is on show.
     rig.tab.click("#link");
     rig.tab.wait("location.hash.includes('camera=0,1,0,5,0.25,0.5')");
@@ -81,6 +83,16 @@ fn two_pages_share_one_simulation() {
     rig.tab.wait(&is_grabbed);
     rig.tab.release(at);
     other.wait(&format!("!{is_grabbed}"));
+    // What replaces or resets the scene of the other page is asked first.
+    other.wait("viewer.pages === 2");
+    other.key('r');
+    other.wait(
+        "document.querySelector('#question-text').textContent.includes('A reset puts it back')",
+    );
+    other.click("#question-no");
     other.load_by_digit('3', "rope");
+    other.wait("document.querySelector('#question-yes').checkVisibility()");
+    assert_eq!(other.evaluate("[viewer.unanswered, viewer.scene]"), json!([0, "curtain"]));
+    other.click("#question-yes");
     rig.tab.wait("viewer.scene === 'rope' && viewer.frame >= 0");
 }

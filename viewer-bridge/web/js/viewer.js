@@ -21,6 +21,8 @@ export function createViewer({ app, colorLegend, charts, connector, banner, inpu
     get framesDrawn() { return renderer.framesDrawn; },
     get epoch() { return simulation.scene?.epoch ?? null; },
     get scene() { return simulation.scene?.name ?? null; },
+    /** Number of pages of the bridge, as far as it has told. */
+    get pages() { return simulation.stats?.clients ?? 1; },
     get connection() { return connector.connection.state; },
     get node() { return simulation.node?.state ?? null; },
     /** Step of the earlier state on show, or null in the present. */

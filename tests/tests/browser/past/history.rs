@@ -47,7 +47,9 @@ fn looking_back_disturbs_nobody_and_the_simulation_goes_on_from_exactly_the_stat
     // A pause of the node leaves the past on show.
     rig.tab.pause();
     assert_eq!(rig.tab.number("viewer.past"), early.step as f64);
+    rig.tab.wait("viewer.pages === 2");
     rig.tab.click("#go-on");
+    rig.tab.click("#question-yes");
     let gone_on = rig.wait_for_state("the state that was on show", |state| {
         state.step > early.step && state.particles == early.particles
     });

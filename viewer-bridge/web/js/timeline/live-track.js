@@ -2,6 +2,7 @@
 // state. Looking back changes nothing for the simulation or for other pages.
 
 import { find } from "../ui/dom.js";
+import { askOthers } from "../ui/prompts.js";
 import { clockText } from "./timeline.js";
 
 /** @typedef {import("./timeline.js").Track} Track */
@@ -42,7 +43,7 @@ export class LiveTrack {
     this.current = { first: 0, last: 0 };
     this.isGoingOn = false;
     this.presentButton.addEventListener("click", () => this.simulation.returnToPresent());
-    this.goOnButton.addEventListener("click", () => this.goOn());
+    this.goOnButton.addEventListener("click", () => this.askToGoOn());
     this.span.addEventListener("change", () => this.change());
     for (const topic of /** @type {const} */ (["history", "past", "node", "connection", "scene"])) simulation.on(topic, () => this.change());
   }
@@ -109,6 +110,12 @@ export class LiveTrack {
     this.commands.run("look", { step, toward: count < 0 ? "before" : "after" }, ({ state_step }) => {
       if (count > 0 && state_step !== undefined && state_step >= (simulation.present?.step ?? 0)) simulation.returnToPresent();
     });
+  }
+
+  /** Lets the simulation go on from the state on show. Asks first if other pages show the simulation. */
+  askToGoOn() {
+    const words = { effect: "Going on from here replaces its state for everybody.", yes: "Go on from here", no: "Keep it" };
+    askOthers(this.simulation, words, () => this.goOn());
   }
 
   /** Lets the simulation go on from the state on show. */

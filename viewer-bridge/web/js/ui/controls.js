@@ -3,7 +3,7 @@
 import { enable, find } from "./dom.js";
 import { MODES } from "../tools/input.js";
 import { CharacterKeys, listenToKeys, returnFocus } from "./keys.js";
-import { Question } from "./prompts.js";
+import { askOthers } from "./prompts.js";
 import { SceneLoader } from "./scene-loader.js";
 import { SceneMenu, neighbour } from "./scene-menu.js";
 
@@ -32,7 +32,7 @@ export class Controls {
     this.reset = find("reset", HTMLButtonElement);
     this.scene = find("scene", HTMLButtonElement);
     this.sceneName = find("scene-name", HTMLElement);
-    this.menu = new SceneMenu((scene) => this.load(scene));
+    this.menu = new SceneMenu((scene) => this.askToLoad(scene));
     this.help = find("help-dialog", HTMLDialogElement);
     this.modes = [...find("modes", HTMLElement).querySelectorAll("button")];
     this.panelToggle = find("panel-toggle", HTMLButtonElement);
@@ -52,7 +52,7 @@ export class Controls {
   listen() {
     this.pause.addEventListener("click", () => this.togglePause());
     this.step.addEventListener("click", () => this.stepOnce(1));
-    this.reset.addEventListener("click", () => this.app.commands.run("reset"));
+    this.reset.addEventListener("click", () => this.askToReset());
     this.scene.addEventListener("click", () => this.openMenu());
     for (const button of this.modes) button.addEventListener("click", () => this.setMode(/** @type {Mode} */ (button.dataset.mode)));
     find("frame", HTMLButtonElement).addEventListener("click", () => this.views.fit());
@@ -76,7 +76,7 @@ export class Controls {
       ",": () => this.timeline.step(-1),
       "<": () => this.timeline.goToMark(-1),
       ">": () => this.timeline.goToMark(1),
-      r: () => { if (!this.reset.disabled) app.commands.run("reset"); },
+      r: () => { if (!this.reset.disabled) this.askToReset(); },
       "ctrl+z": () => this.undo.run(),
       f: () => views.fit(),
       s: () => this.onPicture(),
@@ -166,17 +166,22 @@ export class Controls {
     if (!this.scene.disabled) this.menu.open(this.scenes(), this.name(), name);
   }
 
-  /** Loads the scene before or after the present one in the list. Asks first if other pages show it. @param {number} by */
+  /** Loads the scene before or after the present one in the list. @param {number} by */
   loadNeighbour(by) {
-    const present = this.name();
-    const scene = neighbour(this.scenes(), this.loader.requested ?? present, by);
-    if (scene === undefined || this.scene.disabled) return;
-    const others = (this.app.simulation.stats?.clients ?? 1) - 1;
-    if (others < 1) return this.load(scene.name);
-    new Question().ask(
-      { text: `${others === 1 ? "Another page shows" : `${others} other pages show`} this simulation. Loading “${scene.name}” replaces it for everybody.`, yes: `Load ${scene.name}`, no: `Keep ${present ?? "it"}` },
-      (isYes) => { if (isYes) this.load(scene.name); },
-    );
+    const scene = neighbour(this.scenes(), this.loader.requested ?? this.name(), by);
+    if (scene !== undefined && !this.scene.disabled) this.askToLoad(scene.name);
+  }
+
+  /** Loads a scene. Asks first if other pages show the present one. @param {string} scene */
+  askToLoad(scene) {
+    const words = { effect: `Loading “${scene}” replaces it for everybody.`, yes: `Load ${scene}`, no: `Keep ${this.name() ?? "it"}` };
+    askOthers(this.app.simulation, words, () => this.load(scene));
+  }
+
+  /** Resets the scene. Asks first if other pages show it. */
+  askToReset() {
+    const words = { effect: "A reset puts it back to its start for everybody.", yes: "Reset", no: "Keep it" };
+    askOthers(this.app.simulation, words, () => this.app.commands.run("reset"));
   }
 
   /** @param {Mode} mode */

@@ -40,6 +40,15 @@ export class Hint {
   }
 }
 
+/** Does what changes the scene on every page: at once if no other page shows it, else after a question.
+ * @param {import("../state/simulation.js").Simulation} simulation @param {{ effect: string, yes: string, no: string }} words `effect` is a sentence @param {() => void} act */
+export function askOthers(simulation, { effect, yes, no }, act) {
+  const others = (simulation.stats?.clients ?? 1) - 1;
+  if (others < 1) return act();
+  const text = `${others === 1 ? "Another page shows" : `${others} other pages show`} this simulation. ${effect}`;
+  new Question().ask({ text, yes, no }, (isYes) => { if (isYes) act(); });
+}
+
 /** A question with two answers over the picture. It does not block the page. */
 export class Question {
   constructor() {
