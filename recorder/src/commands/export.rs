@@ -53,7 +53,8 @@ const FRAMES_PER_S_DEFAULT: u16 = 25;
     group = clap::ArgGroup::new("selection"),
     after_help = "Pictures of the style wires show colliders, surface triangles, constraints (structural dark, shear \
     lighter, bend dashed, tether dotted; torn ones are left out) and particles (pinned: red squares; \
-    grabbed orange, anchored green, frozen magenta), and of the style shaded smooth surfaces without them. All \
+    grabbed orange, anchored green, frozen magenta), and of the style shaded surfaces without them \
+    and without a caption, each triangle in one shade. All \
     pictures of a call have the same scale. \
     Without an option that selects snapshots there are 8 of them; other formats have every \
     snapshot.\n\n\
@@ -119,7 +120,7 @@ pub(crate) struct ExportArgs {
 enum StyleArg {
     /// Particles, constraints and triangles
     Wires,
-    /// Smooth surfaces and, where there is no surface, structural constraints and loose particles
+    /// Surfaces, each triangle in one shade, and, where there is no surface, structural constraints and loose particles
     Shaded,
 }
 

@@ -57,7 +57,8 @@ pub(crate) struct MeshDrawing<'a> {
 pub enum Style {
     /// All particles, constraints and triangles.
     Wires(Bend),
-    /// Triangles as smooth surfaces and, where there is no surface, structural constraints and loose particles.
+    /// Triangles, each in one shade by the normals of its corners, and, where there is no
+    /// surface, structural constraints and loose particles.
     Shaded,
 }
 

@@ -36,7 +36,7 @@ pub struct Renderer {
     pub size: Size,
     /// Drawn part of the state.
     pub style: Style,
-    /// Name in the caption.
+    /// Name in the caption of the style wires.
     pub scene_name: String,
 }
 
@@ -54,7 +54,9 @@ impl Renderer {
         let room = self.extent.grown(PLANE_MARGIN);
         let mut shapes = solids::shapes(state, &self.camera, &room);
         shapes.extend(MeshDrawing { state, camera: &self.camera, style: self.style }.shapes());
-        shapes.push(Shape::Text(self.caption(state, time_s)));
+        if matches!(self.style, Style::Wires(_)) {
+            shapes.push(Shape::Text(self.caption(state, time_s)));
+        }
         shapes.retain(Shape::is_drawable);
         Picture { size: self.size, shapes }
     }

@@ -474,7 +474,7 @@ impl Simulation {
     /// green and blue. Shape: (height, width, 3).
     ///
     /// `size` is width and height in pixels. `view` is "front", "side", "top" or "iso"; by default it suits the scene.
-    /// The style "wires" shows particles, constraints and triangles, and "shaded" smooth surfaces. `bounds` are two
+    /// The style "wires" shows particles, constraints and triangles, and "shaded" surfaces, each triangle in one shade. `bounds` are two
     /// corners of the box that the picture shows, by default around the state: give them to keep the camera still.
     #[pyo3(signature = (*, size=(960, 720), view=None, style="wires", bounds=None))]
     #[allow(clippy::too_many_arguments, reason = "these are the keywords of Python")]

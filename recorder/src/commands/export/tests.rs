@@ -281,7 +281,9 @@ fn torn_constraints_and_triangles_with_a_torn_side_are_left_out() {
 fn a_shaded_surface_has_neither_wires_nor_dots_and_a_rope_keeps_its_line() {
     let mut state = square();
     state.particles[0].flags = ParticleFlags::PINNED;
-    assert_eq!(counts(&draw_in(Style::Shaded, &state)), [2, 0, 0]);
+    let picture = draw_in(Style::Shaded, &state);
+    assert_eq!(counts(&picture), [2, 0, 0]);
+    assert!(!picture.shapes.iter().any(|one| matches!(one, Shape::Text(_))), "it has a caption");
     for x in [2.0, 3.0, 4.0] {
         state.particles.push(ParticleState { position: [x, 0.0, 0.0], ..ParticleState::default() });
     }

@@ -574,7 +574,7 @@ class Simulation:
         green and blue. Shape: (height, width, 3).
 
         `size` is width and height in pixels. `view` is "front", "side", "top" or "iso"; by default it suits the scene.
-        The style "wires" shows particles, constraints and triangles, and "shaded" smooth surfaces. `bounds` are two
+        The style "wires" shows particles, constraints and triangles, and "shaded" surfaces, each triangle in one shade. `bounds` are two
         corners of the box that the picture shows, by default around the state: give them to keep the camera still.
         """
     def close(self) -> None:
@@ -644,7 +644,7 @@ class Recording:
         green and blue. Shape: (height, width, 3).
 
         `size` is width and height in pixels. `view` is "front", "side", "top" or "iso"; by default it suits the scene.
-        The style "wires" shows particles, constraints and triangles, and "shaded" smooth surfaces. `bounds` are two
+        The style "wires" shows particles, constraints and triangles, and "shaded" surfaces, each triangle in one shade. `bounds` are two
         corners of the box that the picture shows, by default around the state: give them to keep the camera still.
 
         Raises `KeyError` for a step that was not recorded.
