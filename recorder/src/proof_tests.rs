@@ -20,7 +20,9 @@ use sim_contract::Action;
 use sim_solver::{SOLVER_VERSION, Scene, Solver, builtin};
 
 use crate::simulation::{Job, SimulationResult, States, simulate};
-use crate::verification::{StepRange, Verdict, VerifyError, VerifyOptions, VerifyReport, verify};
+use crate::verification::{
+    StepGap, StepRange, Verdict, VerifyError, VerifyOptions, VerifyReport, verify,
+};
 
 const COMMANDS: &str = r#"
     {"step":10,"kind":"grab","particle":90,"target":[0.5,0.2,0.3],"over_s":0.1}
@@ -314,6 +316,14 @@ fn outcomes_out_of_order_in_the_file_are_applied_in_order() {
 }
 
 #[test]
+fn a_recording_of_one_snapshot_has_no_step_to_compare() {
+    let (file, _) = record(&job("curtain", "", 0));
+    let (report, _) = check(&file);
+    assert_eq!((report.verdict, report.skipped), (Verdict::Identical, None));
+    assert_eq!(report.to_string(), "no step to compare after step 0");
+}
+
+#[test]
 fn a_recording_that_starts_late_and_declares_missing_snapshots_is_bit_identical() {
     let (file, _) = record(&job("curtain", COMMANDS, 400));
     // Of the snapshots from 40 to 400, every fifth one is in the file.
@@ -329,6 +339,7 @@ fn a_recording_that_starts_late_and_declares_missing_snapshots_is_bit_identical(
     let (report, _) = check(&partial(missing_count));
     // The first keyframe is that of the pin at step 50. Every fifth step follows.
     assert_eq!(report.to_string(), "70 steps bit-identical (50..=400)");
+    assert_eq!(report.skipped, Some(StepGap { from: 40, to: 45 }));
     let lost = ["/particles", "/steps"].map(|topic| (topic, missing_count));
     assert_eq!(report.lost, BTreeMap::from(lost));
     let (report, _) = check(&partial(missing_count - 1));

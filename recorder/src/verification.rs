@@ -80,6 +80,7 @@ fn report(
     }
     report.lost = verification.numbers.lost(verification.frames.seen.closing.as_deref());
     report.not_covered = verification.coverage.not_covered();
+    report.skipped = verification.coverage.skipped;
     Ok(report)
 }
 

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use recorder::verification::{
-    StepRange, Verdict, VerifyError, VerifyOptions, VerifyReport, verify,
+    StepGap, StepRange, Verdict, VerifyError, VerifyOptions, VerifyReport, verify,
 };
 use recorder::{IntactParts, LogEnd, LogReader, ReadError, Wanted, find_state};
 use sim_contract::{Stop, printable_line};
@@ -23,7 +23,7 @@ use crate::cli::thread_args::ThreadArgs;
     after_help = "Compares everything that a recorder writes, also where the checksums are gone, \
     and lists the messages that are missing. --verbose also lists the content that is not compared, because \
     nothing else in the file can contradict it. Of a damaged recording, compares what `recorder repair` would save. Behind missing outcomes, it goes on from the next complete state.\n\n\
-    Exit codes: 0 every recorded step is bit-identical; 1 not verifiable; 3 different, outcomes missing, or file truncated \
+    Exit codes: 0 every recorded step is bit-identical, or there is none to compare; 1 not verifiable; 3 different, outcomes missing, or file truncated \
     or damaged.\n\nExamples:\n  \
     recorder verify run.mcap\n  \
     recorder verify run.mcap --from 4800 --to 9600\n  \
@@ -126,11 +126,25 @@ impl VerifyArgs {
         Ok(StepRange { start: place.keyframe_step, last })
     }
 
+    /// Says why the simulation did not start at the first step that was asked for.
+    fn start_text(&self, report: &VerifyReport) -> Option<String> {
+        let first = report.first_step;
+        if let Some(from) = self.from {
+            return (first < from).then(|| {
+                format!("\nstarted at step {first}, the last complete state up to --from {from}")
+            });
+        }
+        let StepGap { from, to } = report.skipped?;
+        Some(format!("\nnot compared: steps {from}..={to}, before the first complete state"))
+    }
+
     /// Returns the report for people.
     fn text(&self, report: &VerifyReport) -> String {
         let lost = report.lost.iter().map(|(topic, count)| format!("\nmissing: {topic} {count}"));
         let gaps = report.gaps.iter().map(|gap| format!("\ngap: steps {}..={}", gap.from, gap.to));
-        let mut text = format!("{report}{}{}", gaps.collect::<String>(), lost.collect::<String>());
+        let start = self.start_text(report).unwrap_or_default();
+        let [gaps, lost]: [String; 2] = [gaps.collect(), lost.collect()];
+        let mut text = format!("{report}{start}{gaps}{lost}");
         if self.verbose {
             let lines =
                 report.not_covered.iter().map(|what| format!("\n  {}", printable_line(what)));

@@ -159,6 +159,7 @@ impl Verification {
                 return Ok(Some((step, finding)));
             }
             self.coverage.skipped_count += 1;
+            self.coverage.skipped.get_or_insert(StepGap { from: step, to: step }).to = step;
         }
     }
 

@@ -3,6 +3,8 @@
 use crate::counted;
 use crate::log::Topic;
 
+use super::finding::StepGap;
+
 /// Content that a file has only once, so that nothing in it can contradict an edit.
 const ALWAYS: [&str; 9] = [
     "the times of reception (log_time) of messages and of the scene",
@@ -42,6 +44,8 @@ pub(super) struct Coverage {
     pub(super) is_restored: bool,
     /// States that a command put in place, and that the simulation had not computed before.
     pub(super) given_count: u64,
+    /// The steps of the snapshots before the state to start from.
+    pub(super) skipped: Option<StepGap>,
     /// Messages after the last snapshot, or of steps after it.
     pub(super) trailing_count: usize,
     /// Messages before the first snapshot with a keyframe that describe no state of the simulation.

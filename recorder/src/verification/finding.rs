@@ -37,12 +37,12 @@ pub enum SnapshotFinding {
     NotCompared,
 }
 
-/// Steps whose states could not be simulated, because outcomes are missing.
+/// Steps whose states were not compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct StepGap {
-    /// The first step that may lack an outcome.
+    /// The first step: of a gap, the first one that may lack an outcome.
     pub from: u64,
-    /// The step of the complete state from which the simulation went on, or of the last state.
+    /// The last step: of a gap, the step of the complete state from which the simulation went on, or of the last state.
     pub to: u64,
 }
 

@@ -28,6 +28,8 @@ pub struct VerifyReport {
     pub what: Option<String>,
     /// Steps whose states could not be simulated, because outcomes are missing.
     pub gaps: Vec<StepGap>,
+    /// Steps of the snapshots before the complete state from which the simulation started.
+    pub skipped: Option<StepGap>,
     #[serde(flatten)]
     /// The first field that differs, if particles do.
     pub difference: Option<Difference>,
@@ -74,6 +76,7 @@ impl VerifyReport {
             step: None,
             what: None,
             gaps: Vec::new(),
+            skipped: None,
             difference: None,
             end: None,
             lost: BTreeMap::new(),
@@ -136,6 +139,9 @@ impl fmt::Display for VerifyReport {
         let what = printable_line(self.what.as_deref().unwrap_or(""));
         let step = self.step.unwrap_or(0);
         match self.verdict {
+            Verdict::Identical if self.steps_identical == 0 => {
+                write!(f, "no step to compare after step {}", self.first_step)
+            }
             Verdict::Identical => {
                 let last = self.last_identical_step.unwrap_or(self.first_step);
                 write!(f, "{} bit-identical ({}..={last})", steps(""), self.first_step)
