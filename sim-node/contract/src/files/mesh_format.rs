@@ -1,7 +1,7 @@
-//! Formats of meshes that are not read, told by their content.
+//! Formats of meshes and pictures that are not read, told by their content.
 
 /// The beginnings of files.
-const SIGNATURES: [(&[u8], &str); 9] = [
+const SIGNATURES: [(&[u8], &str); 14] = [
     (b"glTF", "a glTF file (binary)"),
     (b"#usda", "a USD file (text)"),
     (b"PXR-USDC", "a USD file (crate)"),
@@ -11,6 +11,11 @@ const SIGNATURES: [(&[u8], &str); 9] = [
     (b"; FBX", "an FBX file"),
     (b"BLENDER", "a file of Blender"),
     (b"Ogawa", "an Alembic file"),
+    (b"\x89PNG\r\n\x1a\n", "a picture (PNG)"),
+    (b"\xff\xd8\xff", "a picture (JPEG)"),
+    (b"OFF\n", "an OFF file"),
+    (b"OFF\r", "an OFF file"),
+    (b"OFF ", "an OFF file"),
 ];
 /// The beginning of a ZIP archive, and the place of the first file's name in it.
 const ZIP: (&[u8], usize) = (b"PK\x03\x04", 30);
@@ -26,6 +31,7 @@ pub(super) fn other_format(bytes: &[u8], size_bytes: u64) -> Option<&'static str
         .or_else(|| zip_archive(bytes))
         .or_else(|| stl(bytes, size_bytes))
         .or_else(|| gltf_text(bytes))
+        .or_else(|| collada(bytes))
 }
 
 fn zip_archive(bytes: &[u8]) -> Option<&'static str> {
@@ -52,6 +58,12 @@ fn stl(bytes: &[u8], size_bytes: u64) -> Option<&'static str> {
 fn gltf_text(bytes: &[u8]) -> Option<&'static str> {
     let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
     (text.starts_with(b"{") && contains(text, b"\"asset\"")).then_some("a glTF file (JSON)")
+}
+
+/// No scene and no other mesh begins with a tag.
+fn collada(bytes: &[u8]) -> Option<&'static str> {
+    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
+    (text.starts_with(b"<") && contains(text, b"<COLLADA")).then_some("a COLLADA file")
 }
 
 fn contains(bytes: &[u8], word: &[u8]) -> bool {
@@ -99,6 +111,11 @@ mod tests {
             (binary_stl(b"v 0 0 0"), "an STL file (binary)"),
             (b"ply\r\nformat ascii 1.0\n".to_vec(), "a PLY file"),
             (b"Kaydara FBX Binary  \0".to_vec(), "an FBX file"),
+            (b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR".to_vec(), "a picture (PNG)"),
+            (b"\xff\xd8\xff\xe0\0\x10JFIF".to_vec(), "a picture (JPEG)"),
+            (b"OFF\n8 6 12\n".to_vec(), "an OFF file"),
+            (b"OFF 8 6 12\n".to_vec(), "an OFF file"),
+            (b"<?xml version=\"1.0\"?>\n<COLLADA version=\"1.4.1\">".to_vec(), "a COLLADA file"),
         ] {
             assert_eq!(format(&bytes), Some(expected));
         }
