@@ -3,6 +3,7 @@
 use std::num::NonZeroU32;
 
 use recorder::{AllCounts, ContentSelection, Message, ParticleBuffer, StepRow, Topic};
+use sim_cli::did_you_mean;
 
 use crate::cli::parse::whole_number_in;
 use crate::commands::record::queue::{Content, Item};
@@ -72,8 +73,9 @@ impl SelectionArgs {
 fn topic(text: &str) -> Result<Topic, String> {
     let name = format!("/{}", text.trim().trim_start_matches('/'));
     Topic::from_name(&name).ok_or_else(|| {
-        let names: Vec<_> = Topic::ALL.map(|topic| &topic.name()[1..]).into();
-        format!("it must be topics of a recording: {}", names.join(", "))
+        let names = Topic::ALL.map(|topic| &topic.name()[1..]);
+        let guess = did_you_mean(&name[1..], names);
+        format!("it must be topics of a recording: {}{guess}", names.join(", "))
     })
 }
 
@@ -314,6 +316,7 @@ mod tests {
     fn topics_that_readers_need_cannot_be_left_out() {
         assert_eq!((topic("/status"), topic("steps")), (Ok(Topic::Status), Ok(Topic::Steps)));
         assert!(topic("stats").unwrap_err().contains("particles"));
+        assert!(topic("partcles").unwrap_err().ends_with(" (did you mean 'particles'?)"));
         assert!(optional_topic("steps").unwrap_err().starts_with("every reader needs it"));
         let args =
             SelectionArgs { topics: vec![Topic::Status, Topic::Tf], ..SelectionArgs::default() };
