@@ -163,9 +163,8 @@ fn check_reserve(args: &RecordArgs, names: &FileNames) -> anyhow::Result<()> {
     let path = names.path(0);
     if names.is_single() && args.split.ring().is_short(&path) {
         let path = output::path_text(&path);
-        bail!(
-            "{path}: less than --min-free is free on its disk; free space, or choose another folder"
-        );
+        // The viewer shows this to a user who has not given --min-free, with its own remedy.
+        bail!("{path}: its disk has less free space than the recording is to leave");
     }
     Ok(())
 }

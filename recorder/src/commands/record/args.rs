@@ -242,6 +242,16 @@ mod tests {
     }
 
     #[test]
+    fn a_file_does_not_begin_on_a_disk_without_its_reserve() {
+        let args = parse(&["-o", "run.mcap", "--min-free", "9000000GB"]);
+        let error = super::super::check_reserve(&args, &args.names("sim", 0)).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "run.mcap: its disk has less free space than the recording is to leave"
+        );
+    }
+
+    #[test]
     fn a_number_of_files_needs_a_limit_of_a_file_and_a_reserve_does_not() {
         assert!(parse(&["--max-files", "3"]).check().is_err());
         assert!(parse(&["--max-files", "3", "--follow"]).check().is_ok());

@@ -29,7 +29,7 @@ impl StopReason {
             Self::Run(RunEnd::EndStep) => "steps reached",
             Self::Split => "split",
             Self::WriteError => "write error",
-            Self::Reserve => "less than --min-free is free",
+            Self::Reserve => "disk reserve reached",
             Self::ReaderGone => "reader of the progress gone",
         }
     }

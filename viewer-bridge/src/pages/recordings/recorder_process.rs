@@ -57,7 +57,7 @@ pub(super) enum StopReason {
     NewRun,
     #[serde(rename = "new scene loaded")]
     NewLoad,
-    #[serde(rename = "less than --min-free is free")]
+    #[serde(rename = "disk reserve reached")]
     Reserve,
     #[serde(other)]
     Other,
@@ -188,7 +188,7 @@ mod tests {
         let report = r#"{"output":"run.mcap","files":1,"snapshots":7,"lost":{},"stop_reason":"new scene loaded"}"#;
         let Ok(Line::Report(report)) = serde_json::from_str(report) else { panic!() };
         assert_eq!((report.snapshots, report.stop_reason), (7, StopReason::NewLoad));
-        let reserve = r#"{"snapshots":7,"lost":{},"stop_reason":"less than --min-free is free"}"#;
+        let reserve = r#"{"snapshots":7,"lost":{},"stop_reason":"disk reserve reached"}"#;
         let Ok(Line::Report(report)) = serde_json::from_str(reserve) else { panic!() };
         assert_eq!(report.stop_reason, StopReason::Reserve);
         let other = r#"{"snapshots":7,"lost":{},"stop_reason":"something newer"}"#;
