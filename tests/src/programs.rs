@@ -4,6 +4,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
+use anyhow::Context;
+
 /// A built program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Program {
@@ -90,7 +92,9 @@ static FOLDER: OnceLock<PathBuf> = OnceLock::new();
 
 /// Returns the folder of the programs, built with the profile of this test.
 fn built() -> &'static Path {
-    FOLDER.get_or_init(|| build(&["--quiet", "--workspace", "--lib", "--bins", "--examples"]))
+    FOLDER.get_or_init(|| {
+        build(&["--quiet", "--workspace", "--lib", "--bins", "--examples"]).expect("the programs")
+    })
 }
 
 /// Builds the simulation, the recorder and the viewer, and shows the progress of cargo on stderr.
@@ -98,24 +102,32 @@ fn built() -> &'static Path {
 /// One call of cargo builds all three, so that it compiles each dependency once. Afterwards
 /// [`Program::path`] builds nothing, and the other programs may be missing.
 ///
-/// # Panics
-/// If a program does not build.
-pub fn build_products() {
-    FOLDER.get_or_init(|| build(&["-p", "sim-node", "-p", "recorder", "-p", "viewer-bridge"]));
+/// # Errors
+/// If a program does not build, or a signal ends the build.
+pub fn build_products() -> anyhow::Result<()> {
+    build_folder(&["-p", "sim-node", "-p", "recorder", "-p", "viewer-bridge"])
 }
 
 /// Does the same, and builds the example with rigid bodies.
 ///
-/// # Panics
-/// If a program does not build.
-pub fn build_products_and_bodies() {
+/// # Errors
+/// If a program does not build, or a signal ends the build.
+pub fn build_products_and_bodies() -> anyhow::Result<()> {
     let selection = ["-p", "sim-node", "-p", "recorder", "-p", "viewer-bridge"];
     let example = ["-p", "integration-tests", "--bins", "--example", "bodies"];
-    FOLDER.get_or_init(|| build(&[&selection[..], &example].concat()));
+    build_folder(&[&selection[..], &example].concat())
+}
+
+fn build_folder(selection: &[&str]) -> anyhow::Result<()> {
+    if FOLDER.get().is_none() {
+        let folder = build(selection)?;
+        FOLDER.get_or_init(|| folder);
+    }
+    Ok(())
 }
 
 #[allow(clippy::disallowed_methods, reason = "the harness starts processes")]
-fn build(selection: &[&str]) -> PathBuf {
+fn build(selection: &[&str]) -> anyhow::Result<PathBuf> {
     // The executable is target/PROFILE/deps/TEST-HASH or target/PROFILE/PROGRAM.
     let this = std::env::current_exe().expect("the path of this program");
     let folder = this.ancestors().skip(1).find(|folder| !folder.ends_with("deps"));
@@ -131,7 +143,8 @@ fn build(selection: &[&str]) -> PathBuf {
         .args(selection)
         .args(["--profile", profile, "--target-dir"])
         .arg(target)
-        .status();
-    assert!(status.is_ok_and(|status| status.success()), "the programs did not build");
-    folder
+        .status()
+        .context("cannot start cargo")?;
+    anyhow::ensure!(status.success(), "the programs were not built (cargo: {status})");
+    Ok(folder)
 }

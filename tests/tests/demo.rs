@@ -9,7 +9,7 @@ use serde_json::json;
 #[test]
 fn the_demo_shows_its_progress_and_describes_the_recording_after_ctrl_c() {
     // The demo would build them too, but the deadline below does not allow for that.
-    build_products();
+    build_products().unwrap();
     let sandbox = Sandbox::new();
     let mut demo = Process::start(Program::Demo, &sandbox, &[]);
     demo.wait_for_line("building the programs");
@@ -22,8 +22,19 @@ fn the_demo_shows_its_progress_and_describes_the_recording_after_ctrl_c() {
 }
 
 #[test]
+fn a_demo_whose_programs_are_not_built_says_so_in_a_sentence() {
+    let sandbox = Sandbox::new();
+    let demo = Program::Demo.path();
+    let script = r#"RUSTC=/nowhere exec "$0""#;
+    let finished = Process::run(Program::Bash, &sandbox, &["-c", script, demo.to_str().unwrap()]);
+    assert_eq!(finished.code, Some(1), "{}", finished.stderr);
+    let last = finished.stderr.lines().last().unwrap();
+    assert!(last.starts_with("error: the programs were not built"), "{}", finished.stderr);
+}
+
+#[test]
 fn the_demo_with_bodies_drives_them_in_every_step() {
-    build_products_and_bodies();
+    build_products_and_bodies().unwrap();
     let sandbox = Sandbox::new();
     let mut demo = Process::start(Program::Demo, &sandbox, &["--bodies"]);
     demo.wait_for_line("open in a browser:  http://127.0.0.1:");

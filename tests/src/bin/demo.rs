@@ -62,11 +62,11 @@ fn run() -> anyhow::Result<()> {
     let file = file.to_str().context("the temporary folder's path is not UTF-8")?;
 
     note("building the programs");
-    if has_bodies {
-        build_products_and_bodies();
-    } else {
-        build_products();
+    let built = if has_bodies { build_products_and_bodies() } else { build_products() };
+    if stop.is_requested() {
+        bail!("interrupted while building the programs");
     }
+    built?;
     note("starting the node");
     let scene = has_bodies.then(bodies_scene).transpose()?;
     let run = ["run", scene.as_deref().unwrap_or("drape")];
