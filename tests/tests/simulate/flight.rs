@@ -64,7 +64,11 @@ fn a_recording_of_commands_becomes_the_full_one_bit_for_bit() {
     let verified = recorder(&sandbox, &args).json();
     assert_eq!(verified["verdict"], "identical", "{verified}");
     assert_eq!(verified["last_identical_step"], 390, "{verified}");
-    assert!(verified["first_step"].as_u64().unwrap() <= 380, "{verified}");
+    let first = verified["first_step"].as_u64().unwrap();
+    assert!(first < 380, "{verified}");
+    let text = recorder(&sandbox, &["verify", &flight, "--from", "380", "--to", "390"]).success();
+    let expected = format!("\nstarted at step {first}, the last complete state up to --from 380\n");
+    assert!(text.ends_with(&expected), "{text}");
     let refused = recorder(&sandbox, &["verify", &flight, "--from", "390", "--to", "380"]);
     assert!(refused.stderr.contains("--from 390 is after --to 380"), "{refused:?}");
     let refused = recorder(&sandbox, &["verify", &flight, "--from", "99999"]);

@@ -26,8 +26,8 @@ const STRAIN_MIN = 5e-5;
  * swings, as in a flag, reaches its greatest again within that time. */
 const USED_MIN = 0.6;
 const SHRINK_SCANS = 8;
-/** Ends on both sides of 0 that are this equal become equal: the middle of the scale is 0. */
-const EQUAL_SHARE = 0.75;
+/** If the smaller end is at least this part of the other one, both become equal: the middle of the scale is 0. */
+const EQUAL_SHARE = 0.5;
 /** Ends that a user can choose, in the unit of the quantity. @type {Record<Quantity, number[]>} */
 const ENDS = { strain: [0.01, 0.05, 0.2, 1], tension: [0.1, 1, 10, 100], speed: [0.1, 1, 10], kind: [] };
 /** An end that is smaller than this part of the other one is noise: the scale begins at 0. */

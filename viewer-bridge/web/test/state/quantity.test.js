@@ -80,7 +80,7 @@ test("a scale wastes no side that has no values", () => {
   assert.deepEqual(scaleOf(5, 20, 1), { low: -1, high: 1 });
   assert.deepEqual(scaleOf(0, 20, 1), { low: 0, high: 1 });
   assert.deepEqual(scaleOf(0, 0, null), { low: 0, high: 1 });
-  assert.deepEqual(scaleOf(0.1, 0.08, null), { low: -0.1, high: 0.1 }, "0 is in the middle");
+  assert.deepEqual(scaleOf(1, 0.6, null), { low: -1, high: 1 }, "0 is in the middle");
 });
 
 test("values fill three quarters of a scale with short ends", () => {
