@@ -6,7 +6,7 @@ use std::sync::Barrier;
 use std::thread;
 
 use fastrand::Rng;
-use integration_tests::{DEADLINE, Process, Program, Sandbox, Signal, ctl, record, wait_for};
+use integration_tests::{DEADLINE, Process, Program, Sandbox, Signal, ctl, wait_for};
 use recorder::{LogReader, Message};
 use sim_contract::clock::{monotonic_ns, sleep_until};
 use sim_contract::{Action, Client, Endpoint, GivenState, RequestError, Snapshot, SnapshotFlags};
@@ -392,7 +392,9 @@ fn a_recording_and_a_watch_name_each_member_that_joins_leaves_or_is_dropped() {
     let args = ["run", "pendulum", "--lockstep-timeout", "500ms"];
     let node = Process::start_ready(Program::SimNode, &sandbox, &args);
     let file = sandbox.path("run.mcap");
-    let recording = record(&sandbox, &file);
+    // A recording in the lockstep would be a member, too.
+    let mut recording = Process::start(Program::Recorder, &sandbox, &["record", "-o", &file]);
+    recording.wait_for_line("recording from step ");
     let mut watch = Process::start(Program::SimNode, &sandbox, &["ctl", "watch"]);
     watch.wait_for_output(2);
     // A membership of less than a step is named, too.
