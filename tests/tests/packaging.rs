@@ -3,4 +3,5 @@
 
 mod crates;
 mod documents;
+mod release;
 mod units;

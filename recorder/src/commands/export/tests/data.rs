@@ -3,6 +3,7 @@
 
 use std::io::Cursor;
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 use recorder::{AnchorForceRow, ForcesRow, FrameReader, OutcomeRow};
 use sim_contract::{Action, Command, Outcome, PlainF32, RestoreContents};
@@ -133,7 +134,10 @@ struct Folder(PathBuf);
 
 impl Folder {
     fn new(name: &str) -> Self {
-        let folder = format!("recorder-data-{name}-{}", std::process::id());
+        // Tests that run at the same time can give the same name.
+        static COUNT: AtomicU32 = AtomicU32::new(0);
+        let count = COUNT.fetch_add(1, Ordering::Relaxed);
+        let folder = format!("recorder-data-{name}-{}-{count}", std::process::id());
         let folder = std::env::temp_dir().join(folder);
         fs::create_dir_all(&folder).unwrap();
         Self(folder)
