@@ -238,7 +238,9 @@ fn a_foreign_process_that_floods_ready_and_restore_changes_nothing() {
     let sandbox = Sandbox::new();
     let file = sandbox.path("run.mcap");
     let node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
-    let recording = record(&sandbox, &file);
+    // A recording in the lockstep would be a member, too.
+    let mut recording = Process::start(Program::Recorder, &sandbox, &["record", "-o", &file]);
+    recording.wait_for_line("recording from step ");
     let prefix = format!("{}_", sandbox.domain());
     let root = format!("/tmp/catenary-{}-{}", rustix::process::getuid().as_raw(), sandbox.domain());
     let before = ctl(&sandbox, &["status"]);

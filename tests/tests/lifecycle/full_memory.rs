@@ -29,7 +29,7 @@ fn no_program_ends_with_a_signal_when_shared_memory_is_full() {
         .args(["--mount", "sh", "-c", mount, SIZE])
         .arg(env::current_exe().unwrap())
         .args(["--ignored", "--exact", "--nocapture"])
-        .arg("full_memory::no_program_ends_with_a_signal_when_shared_memory_is_full")
+        .arg("lifecycle::full_memory::no_program_ends_with_a_signal_when_shared_memory_is_full")
         .env(INSIDE, "1")
         .output()
         .unwrap();

@@ -172,7 +172,7 @@ fn a_disk_that_is_full_at_a_split_ends_the_recording_and_keeps_the_files_before(
         .args(["--mount", "sh", "-c", mount, &folder])
         .arg(env::current_exe().unwrap())
         .args(["--ignored", "--exact", "--nocapture"])
-        .arg("files::kills::a_disk_that_is_full_at_a_split_ends_the_recording_and_keeps_the_files_before")
+        .arg("recording::files::kills::a_disk_that_is_full_at_a_split_ends_the_recording_and_keeps_the_files_before")
         .env(INSIDE, &folder)
         .output()
         .unwrap();
