@@ -12,17 +12,18 @@ fn the_command_of_the_container_runs_a_node_and_its_page() {
     let command: Vec<String> = serde_json::from_str(line).unwrap();
     let [shell, option, script] = &command[..] else { panic!("{line}") };
     assert_eq!((shell.as_str(), option.as_str()), ("/bin/sh", "-c"));
+    let (node, page) = script.split_once(" & exec ").unwrap();
+    // Another program of this host may have the port.
+    let page = page.replace(":8080", ":0");
     let sandbox = Sandbox::new();
-    let programs = Program::SimNode.path();
-    // Another program of this host may have the port. The node ends with its page, as a container does.
-    let script = format!(
-        "PATH='{}':$PATH; trap 'kill $node; wait' EXIT; {}",
-        programs.parent().unwrap().display(),
-        script.replace(":8080", ":0").replace("& exec ", "& node=$!; "),
-    );
-    let mut container = Process::start(Program::Bash, &sandbox, &["-c", &script]);
-    container.wait_for_line("ready");
-    container.interrupt();
+    let words = |line, program| -> Vec<_> {
+        str::strip_prefix(line, program).unwrap().split_whitespace().collect()
+    };
+    let node = Process::start_ready(Program::SimNode, &sandbox, &words(node, "sim-node"));
+    let page =
+        Process::start_ready(Program::ViewerBridge, &sandbox, &words(&page, "viewer-bridge"));
+    page.interrupt().success();
+    node.interrupt().success();
 }
 
 #[test]
