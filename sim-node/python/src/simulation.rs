@@ -191,7 +191,9 @@ impl Simulation {
         record: Option<(&Path, Existing)>,
     ) -> PyResult<Self> {
         let beside_bytes = record.map_or(0, |_| recording_bytes(&scene));
-        scene.check_memory(beside_bytes).map_err(|error| PyMemoryError::new_err(error.to_string()))?;
+        scene
+            .check_memory(beside_bytes)
+            .map_err(|error| PyMemoryError::new_err(error.to_string()))?;
         let mut solver = Solver::new(&scene);
         solver.compute_forces(has_forces);
         solver.set_threads(threads);
