@@ -53,7 +53,7 @@ pub fn ctl(sandbox: &Sandbox, args: &[&str]) -> serde_json::Value {
     answer
 }
 
-/// Starts a recorder, and waits until the recording has begun.
+/// Starts a recorder in the lockstep, so that it loses nothing on a loaded machine, and waits until the recording has begun.
 ///
 /// # Panics
 /// If the recorder ends before, or the deadline passes.

@@ -20,7 +20,7 @@ use lanes::LaneWork;
 pub enum Kernels {
     /// One constraint after the other, without structure: the oracle for the others.
     Reference,
-    /// Eight lanes in plain arrays, for any processor.
+    /// Eight lanes in the baseline registers of any processor.
     Portable,
     /// Eight lanes in AVX2 registers.
     Avx2,

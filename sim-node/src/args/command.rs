@@ -97,7 +97,7 @@ pub(crate) enum CommandVerb {
     /// quaternion x, y, z, w, separated by commas or spaces. Times ascend. A line that begins with # is a comment. A point
     /// is in m: of a particle relative to the origin of the scene, else relative to the pose at load. The object
     /// moves linearly from where it is, and stays at the last point. At most 2048 points are on their way. Four points
-    /// are a command; the outcome is that of the first command, or of the first one that is rejected.
+    /// are a command; the printed outcome is the outcome of the first command, or of the first rejected command.
     #[command(after_help = "Examples:\n  \
         sim-node ctl follow collider 0 --path wave.csv\n  \
         sim-node ctl follow particle 90 --path arc.csv")]

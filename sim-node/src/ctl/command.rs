@@ -83,8 +83,8 @@ pub(super) fn send(
 }
 
 /// Sends the first command, and if it is applied the others, which append to its motion: several at a time, because the
-/// outcome of each takes a step. Returns the first outcome that is a rejection, or else that of the first command, whose step
-/// is the first that shows the motion.
+/// outcome of each takes a step. Returns the first rejection, or else the outcome of the first command, whose step
+/// is the first step that shows the motion.
 fn request_all(client: &mut Client, args: &CtlArgs, actions: &[Action]) -> anyhow::Result<Outcome> {
     let (first, others) = actions.split_first().context("there is nothing to send")?;
     let begun = client.request(*first, args.timeout())?;

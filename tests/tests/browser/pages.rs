@@ -83,7 +83,7 @@ fn two_pages_share_one_simulation() {
     rig.tab.wait(&is_grabbed);
     rig.tab.release(at);
     other.wait(&format!("!{is_grabbed}"));
-    // What replaces or resets the scene of the other page is asked first.
+    // The page asks before it replaces or resets a scene that another page shows.
     other.wait("viewer.pages === 2");
     other.key('r');
     other.wait(

@@ -47,7 +47,7 @@ fn pull_corner(program: Program) {
     let (pulled, released) = (heights(pulled), heights(released));
     assert_eq!((pulled.len(), released.len()), (2, 2), "{printed}");
     assert!(pulled[0] < 0.1 && pulled[1] > 0.25, "{printed}");
-    // How far it falls depends on how the curtain moved before.
+    // How far the corner falls depends on how the curtain moved before.
     assert!(released[1] < released[0] - 0.05, "{printed}");
     let status = ctl(&sandbox, &["status"]);
     let counts = (status["outcomes"].as_u64(), status["rejected_commands"].as_u64());

@@ -70,7 +70,7 @@ pub(crate) struct SliceReader<T: Debug + ZeroCopySend + 'static, H: SliceHeader>
 }
 
 impl<T: Debug + ZeroCopySend + 'static, H: SliceHeader> SliceReader<T, H> {
-    /// Reads the messages of the owner, and drops those of other publishers without a trace.
+    /// Reads the messages of the owner, and drops the messages of other publishers without a trace.
     pub(crate) fn create(
         service: &Slices<T, H>,
         spec: &ServiceSpec,
@@ -157,7 +157,7 @@ pub(crate) struct ValueReader<T: Debug + Copy + ZeroCopySend + 'static> {
 }
 
 impl<T: Debug + Copy + ZeroCopySend + 'static> ValueReader<T> {
-    /// Reads the messages of the owner, and drops those of other publishers without a trace.
+    /// Reads the messages of the owner, and drops the messages of other publishers without a trace.
     pub(crate) fn create(
         service: &Values<T>,
         spec: &ServiceSpec,

@@ -108,7 +108,8 @@ class Commands(ABC, Generic[Result]):
         with a quaternion x, y, z, w behind them. Points are as those of `grab` and `move_collider`. Times ascend, up to
         3600 s. The object moves linearly from where it is, and stays at the last point. With `append`, the points
         come after those of the motion under way, and their times count from its beginning. At most 2048 points of all
-        motions are on their way. Four points are a command, in the order given; the result is that of the first one.
+        motions are on their way. Four points are a command, in the order given; the result is the outcome of the first
+        command.
         """
         rows = [[float(number) for number in row] for row in path]
         return self._perform_all(Action.follow(object, index, rows, append))
@@ -147,7 +148,7 @@ class Commands(ABC, Generic[Result]):
         such as `{"shear": 0.5}`. `bending` replaces the rigidity of all bends, or with a dict that of the bends of
         some generated blocks, such as `{1: 1e-3}` for the second one. `friction` and `restitution` change all
         colliders, or with a dict some of them, such as `{2: 0.3}`. Each value is a command of its own, in the order
-        given; the result is that of the last one.
+        given; the result is the outcome of the last command.
         """
         actions = [action for name, value in values.items() for action in _settings(name, value)]
         if not actions:

@@ -79,7 +79,7 @@ pub(super) fn reading_bytes(size_bytes: usize) -> u64 {
      (`ulimit -v`), or make the scene smaller"
 )]
 pub struct NotEnoughMemory {
-    /// The memory that the scene takes beside that of the process so far.
+    /// Memory that the scene takes, beside the memory that the process has already.
     pub needed_mib: u64,
 }
 
@@ -139,8 +139,8 @@ impl Scene {
     }
 
     /// Returns the memory that a solver of this scene takes with one thread: at least what it needs at any time, and an
-    /// eighth and 8 MiB more, where an allocator and scenes unlike the measured ones have room. Without this margin it is 0.95
-    /// to 1.2 times the need, and up to 1.6 times that of sheets without constraints and of meshes with tethers.
+    /// eighth and 8 MiB more, where an allocator and scenes unlike the measured ones have room. Without this margin, the estimate is
+    /// 0.95 to 1.2 times the need, and up to 1.6 times the need of sheets without constraints and of meshes with tethers.
     pub fn memory_bytes(&self) -> u64 {
         let explicit = self.particles.len() as u64 * (PARTICLE_BYTES + self.particle_bytes())
             + self.constraints.len() as u64 * LOOSE_CONSTRAINT_BYTES

@@ -9,9 +9,9 @@ use crate::reason::Reason;
 use crate::suggestion::nearest;
 use crate::text::Text;
 
-/// Allowed contact distances, for one that is a number > 0 and was rejected all the same.
-const TOO_MANY_NEIGHBOURS: &str = "a smaller distance; this one has too many neighbours: at load, at most 32 pairs of \
-     particles, each counted once, or 128 triangles for each particle, on average, may be within 1.6 times of it";
+/// Allowed contact distances, where the rejected distance is a number > 0. The solver has the limits.
+const TOO_MANY_NEIGHBOURS: &str =
+    "a smaller distance: at load, particles have too many neighbours within this one";
 
 impl ParameterInfo {
     /// Returns the allowed values in words.
@@ -205,7 +205,7 @@ mod tests {
             };
             action.allowed_values(Reason::OutOfRange).unwrap()
         };
-        assert!(values(0.2).starts_with("a smaller distance; this one has too many neighbours"));
+        assert!(values(0.2).starts_with("a smaller distance: "));
         assert_eq!(values(-0.2), "a number > 0, or off for none");
     }
 
