@@ -11,6 +11,9 @@ use sim_contract::ScratchDomain;
 use super::client::{ClientResult, READY};
 use crate::args::ClientRole;
 
+/// This program, also if a new version has replaced its file meanwhile.
+const THIS_PROGRAM: &str = "/proc/self/exe";
+
 /// Client processes. Dropping them ends them.
 #[derive(Debug)]
 pub(super) struct Children(Vec<ClientProcess>);
@@ -57,9 +60,8 @@ impl ClientProcess {
         reason = "`bench` starts this program again as its clients"
     )]
     fn start(domain: &ScratchDomain, role: ClientRole) -> anyhow::Result<Self> {
-        let program = std::env::current_exe().context("finding this program")?;
         let role = role.to_possible_value().context("a role has a name")?;
-        let mut child = Command::new(program)
+        let mut child = Command::new(THIS_PROGRAM)
             .args(["bench-client", role.get_name(), "--domain", domain.name()])
             // Ctrl-C reaches `bench` alone, which ends its clients in order.
             .process_group(0)
