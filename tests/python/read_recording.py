@@ -34,7 +34,7 @@ def main(recording, published):
         assert attachments == ["scene.toml"], attachments
         metadata = {record.name: record.metadata for record in reader.iter_metadata()}
         assert list(metadata) == ["run", "recorder"], metadata
-        assert metadata["run"]["format_version"] == "6", metadata
+        assert metadata["run"]["format_version"] == "7", metadata
         assert metadata["run"]["bend_count"] == "0", metadata
         last_log_time, cloud_times, validators = 0, [], {}
         for schema, channel, message in reader.iter_messages(log_time_order=False):

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use fastrand::Rng;
-use recorder::{FrameReader, LogReader};
+use recording::{FrameReader, LogReader};
 use sim_contract::{
     Action, Client, ELEMENTS_MAX, Endpoint, GivenState, MovedObject, Outcome, ParameterValue,
     ParticleState, PathPart, PathPoint, Reason, RestoreContents, Text, scene_hash,

@@ -2,7 +2,7 @@
 //! whole output.
 
 use integration_tests::{Finished, Process, Program, Sandbox, ctl};
-use recorder::{Closing, LogOptions, LogReader, LogWriter, Message, RunDescription};
+use recording::{Closing, LogOptions, LogReader, LogWriter, Message, RunDescription};
 
 /// ESC, BEL, the one-character CSI, a change of direction, and a line that looks like a report.
 const TEXT: &str = "x\u{1b}[2J\u{7}\u{9b}31m\u{202e}\nstopped     forged";
@@ -45,9 +45,7 @@ fn recording(sandbox: &Sandbox) -> String {
     let mut new = LogWriter::create(Vec::new(), LogOptions::default(), &run, &scene, 0).unwrap();
     while let Some(logged) = old.next_message().unwrap() {
         new.write(&logged.message, 0).unwrap();
-        if let Message::Step(row) = &logged.message
-            && row.step == 0
-        {
+        if matches!(&logged.message, Message::Particles { step: 0, .. }) {
             let json = format!(
                 r#"{{"step":1,"client_id":0,"sequence":0,"index":0,"kind":"pin","particle":0,"status":"applied","reason":{}}}"#,
                 serde_json::to_string(TEXT).unwrap()
@@ -99,8 +97,12 @@ fn a_recording_cannot_control_the_terminal() {
     let file = recording(&sandbox);
     run(&sandbox, Program::Recorder, &["info", &file]).success();
     run(&sandbox, Program::Recorder, &["info", &file, "--json"]).success();
-    assert_eq!(run(&sandbox, Program::Recorder, &["verify", "-v", &file]).code, Some(3));
-    assert_eq!(run(&sandbox, Program::Recorder, &["verify", &file, "--json"]).code, Some(3));
+    for args in [["verify", "-v", &file], ["verify", "--json", &file]] {
+        let Finished { code, stdout, stderr, .. } =
+            Process::run(Program::Recorder, &sandbox, &args);
+        assert_eq!(code, Some(3), "{stdout}");
+        assert_printable(&(stdout + &stderr));
+    }
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use integration_tests::{Process, Program, Sandbox};
-use recorder::Topic;
+use recording::Topic;
 use sim_contract::PARAMETERS;
 
 const README: &str = include_str!("../../README.md");

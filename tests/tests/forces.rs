@@ -5,7 +5,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use integration_tests::{DEADLINE, Process, Program, Sandbox, Signal, ctl, wait_for};
-use recorder::{ForcesRow, LogReader, Message};
+use recording::{ForcesRow, LogReader, Message};
 use sim_contract::{Action, Client, ForceKind, Forces};
 
 const RATE_HZ: u32 = 240;

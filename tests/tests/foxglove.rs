@@ -7,7 +7,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use integration_tests::{DEADLINE, Process, Program, Sandbox, wait_for};
-use recorder::{FrameReader, LogReader};
+use recording::{FrameReader, LogReader};
 use serde_json::{Value, json};
 use sim_contract::{Client as Reader, ParticleFlags, ParticleState};
 

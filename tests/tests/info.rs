@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use integration_tests::{Finished, Process, Program, Sandbox, ctl, record};
-use recorder::{LogReader, LoggedMessage, Message, StepRow};
+use recording::{LogReader, LoggedMessage, Message, StepRow};
 use roxmltree::{Document, Node};
 use serde_json::{Value, json};
 

@@ -7,7 +7,7 @@ use std::process::Command;
 
 /// Programs, as `cargo run` builds them, and every package, as `cargo test` does.
 const PROGRAMS: [&str; 5] = ["sim-node", "sim-c", "recorder", "viewer-bridge", "integration-tests"];
-const PACKAGES: [&str; 10] = [
+const PACKAGES: [&str; 11] = [
     "sim-c",
     "sim-types",
     "sim-cli",
@@ -16,6 +16,7 @@ const PACKAGES: [&str; 10] = [
     "sim-lessons",
     "sim-node",
     "recorder",
+    "recording",
     "viewer-bridge",
     "integration-tests",
 ];

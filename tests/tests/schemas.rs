@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use integration_tests::{Process, Program, Sandbox, ctl, record};
-use recorder::{LogReader, MessageEncoder, Topic, TopicFormat};
+use recording::{LogReader, MessageEncoder, Topic, TopicFormat};
 use serde_json::{Value, json};
 use sim_contract::Action;
 

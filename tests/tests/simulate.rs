@@ -7,7 +7,7 @@ mod flight;
 use std::path::Path;
 
 use integration_tests::{Finished, Process, Program, Sandbox, ctl, wait_for};
-use recorder::{Frame, FrameReader, LogReader};
+use recording::{Frame, FrameReader, LogReader};
 
 fn node(sandbox: &Sandbox, args: &[&str]) -> Process {
     Process::start_ready(Program::SimNode, sandbox, args)

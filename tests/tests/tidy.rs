@@ -10,7 +10,7 @@ mod module_graph;
 
 /// The allowed dependencies: each crate with the workspace crates and restricted libraries it may use.
 /// Every crate also uses `build-features`, which has no code.
-const ARROWS: [(&str, &[&str]); 10] = [
+const ARROWS: [(&str, &[&str]); 11] = [
     ("sim-types", &[]),
     ("sim-solver", &["sim-types"]),
     ("sim-contract", &["iceoryx2", "sim-types"]),
@@ -18,9 +18,10 @@ const ARROWS: [(&str, &[&str]); 10] = [
     ("sim-cli", &["sim-contract", "sim-types"]),
     ("sim-lessons", &["sim-solver"]),
     ("sim-node", &["sim-cli", "sim-contract", "sim-lessons", "sim-solver"]),
-    ("recorder", &["mcap", "sim-cli", "sim-contract", "sim-solver"]),
-    ("viewer-bridge", &["foxglove", "recorder", "sim-cli", "sim-contract", "sim-solver"]),
-    ("integration-tests", &["recorder", "sim-contract", "sim-solver", "viewer-bridge"]),
+    ("recorder", &["mcap", "recording", "sim-cli", "sim-contract", "sim-solver"]),
+    ("recording", &["mcap", "sim-contract", "sim-solver"]),
+    ("viewer-bridge", &["foxglove", "recording", "sim-cli", "sim-contract", "sim-solver"]),
+    ("integration-tests", &["recording", "sim-contract", "sim-solver", "viewer-bridge"]),
 ];
 
 /// Words that do not begin a doc comment. It begins with a noun phrase or a third-person verb.

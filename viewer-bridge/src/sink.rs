@@ -6,7 +6,7 @@
 use std::fmt::Debug;
 use std::sync::Arc;
 
-use recorder::{OutcomeRow, StatusRow, StepRow};
+use recording::{OutcomeRow, StatusRow, StepRow};
 use sim_contract::{
     BendState, ConstraintState, Forces, LoadHeader, ParticleState, TornConstraint, Triangle,
 };

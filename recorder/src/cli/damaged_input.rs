@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow};
-use recorder::{FindStateError, IntactParts, LogEnd, ReadError, RepairError};
+use recording::{FindStateError, IntactParts, LogEnd, ReadError, RepairError};
 use sim_contract::{Stop, is_being_written};
 
 /// A truncated or damaged recording that lacks what a subcommand needs. The program ends with exit code 3.

@@ -5,7 +5,7 @@ use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
 use anyhow::bail;
-use recorder::{Compression, Existing, LogOptions, LogWriter, PartFile};
+use recording::{Compression, Existing, LogOptions, LogWriter, PartFile};
 use sim_contract::part_path;
 
 /// The option to replace existing files.

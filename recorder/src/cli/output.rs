@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 
 use anyhow::Context;
 use indicatif::ProgressBar;
-use recorder::LogEnd;
+use recording::LogEnd;
 use serde::Serialize;
 use sim_contract::{console, is_being_written, printable, printable_line};
 

@@ -1,5 +1,8 @@
 //! The option for the number of solver threads.
 
+use std::num::NonZero;
+use std::thread::available_parallelism;
+
 use sim_solver::THREADS_MAX;
 
 use super::parse::whole_number_in;
@@ -12,6 +15,21 @@ pub(crate) struct ThreadArgs {
     #[arg(long, value_name = "N", default_value_t = 1, allow_hyphen_values = true,
         value_parser = thread_count)]
     threads: usize,
+}
+
+/// The option of the subcommand that simulates the parts of a recording side by side.
+#[derive(Debug, clap::Args)]
+pub(crate) struct PartArgs {
+    /// Parts of the recording to simulate at the same time, each on one core, 1 to 64. Default: the number of cores
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = thread_count)]
+    threads: Option<usize>,
+}
+
+impl PartArgs {
+    pub(crate) fn count(&self) -> usize {
+        let cores = || available_parallelism().map_or(1, NonZero::get).min(THREADS_MAX as usize);
+        self.threads.unwrap_or_else(cores)
+    }
 }
 
 impl ThreadArgs {

@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use recorder::{
+use recording::{
     CheckExtent, CheckReport, Finding, ReadError, check_file, counted, open_regular_file,
 };
 use serde::Serialize;

@@ -7,7 +7,7 @@ mod report;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use recorder::{ContentSelection, FileSource, FrameReader, LogEnd, LogReader};
+use recording::{FileSource, FrameReader, LogEnd, LogReader};
 use sim_contract::Stop;
 
 use crate::cli::damaged_input::lacks;
@@ -70,9 +70,7 @@ pub(crate) fn run(args: &DiffArgs) -> anyhow::Result<Exit> {
 fn open(path: &Path, stop: &Stop) -> anyhow::Result<FrameReader<FileSource>> {
     let opened = || -> anyhow::Result<_> {
         let log = LogReader::open_until(path, stop)?;
-        let selection = log.selection();
-        selection.require(&ContentSelection::FOR_STATES, "`recorder diff`")?;
-        selection.require_all_particles("`recorder diff`")?;
+        log.selection().require_all_particles("`recorder diff`")?;
         Ok(FrameReader::new(log))
     };
     opened().with_context(|| output::path_text(path))

@@ -14,10 +14,10 @@ use std::time::Duration;
 
 use anyhow::Context;
 use clap::error::ErrorKind;
-use recorder::pictures::{Bend, PictureOptions, Size, Style, View};
-use recorder::{
-    ContentSelection, IntactParts, LogEnd, LogReader, ReadError, SceneState, SceneStateError,
-    open_regular_file, visit_states,
+use recording::pictures::{Bend, PictureOptions, Size, Style, View};
+use recording::{
+    IntactParts, LogEnd, LogReader, ReadError, SceneState, SceneStateError, open_regular_file,
+    visit_states,
 };
 use sim_contract::Stop;
 
@@ -102,7 +102,7 @@ pub(crate) struct ExportArgs {
     /// Direction of view of pictures [default: front for a 2-D scene, along the thin axis of a flat
     /// scene, else iso]
     #[arg(long, value_enum)]
-    view: Option<View>,
+    view: Option<ViewArg>,
     /// Appearance of pictures [default: wires]
     #[arg(long, value_enum)]
     style: Option<StyleArg>,
@@ -113,6 +113,30 @@ pub(crate) struct ExportArgs {
     overwrite: OverwriteArgs,
     #[command(flatten)]
     as_json: AsJson,
+}
+
+/// Direction of view of pictures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum ViewArg {
+    /// Along the depth axis, with x to the right and the scene's up axis up
+    Front,
+    /// From the right-hand side of the front view
+    Side,
+    /// From above
+    Top,
+    /// Oblique: turned by 30 degrees, from 20 degrees above
+    Iso,
+}
+
+impl From<ViewArg> for View {
+    fn from(view: ViewArg) -> Self {
+        match view {
+            ViewArg::Front => Self::Front,
+            ViewArg::Side => Self::Side,
+            ViewArg::Top => Self::Top,
+            ViewArg::Iso => Self::Iso,
+        }
+    }
 }
 
 /// Appearance of pictures.
@@ -130,8 +154,6 @@ pub(crate) fn run(args: &ExportArgs) -> anyhow::Result<Exit> {
     let path = output::path_text(&args.file);
     let open = || LogReader::open_until(&args.file, &stop);
     let log = open().with_context(|| path.clone())?;
-    let needed = log.selection().require(&ContentSelection::FOR_PICTURES, "`recorder export`");
-    needed.with_context(|| path.clone())?;
     let needed = log.selection().require_all_particles("`recorder export`");
     needed.with_context(|| path.clone())?;
     let format = args.format.format().context("one of the formats is required")?;
@@ -264,7 +286,8 @@ impl ExportArgs {
             Some(StyleArg::Shaded) => Style::Shaded,
             _ => Style::Wires(if self.no_bend { Bend::Hide } else { Bend::Draw }),
         };
-        PictureOptions { size: self.size.unwrap_or(SIZE_DEFAULT), view: self.view, style }
+        let view = self.view.map(View::from);
+        PictureOptions { size: self.size.unwrap_or(SIZE_DEFAULT), view, style }
     }
 
     /// Returns the wall-clock time of a frame.

@@ -13,8 +13,8 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use recorder::pictures::encode_svg;
-use recorder::{IntactParts, LogEnd, LogReader, Message, PartFile, ReadError};
+use recording::pictures::encode_svg;
+use recording::{IntactParts, LogEnd, LogReader, Message, PartFile, ReadError};
 use sim_contract::Stop;
 
 use crate::cli::damaged_input::intact_parts;
@@ -151,7 +151,7 @@ fn columns<R: Read>(mut log: LogReader<R>, timing: &Timing) -> anyhow::Result<[C
 
 #[cfg(test)]
 mod tests {
-    use recorder::{Closing, LogOptions, LogWriter, RunDescription, StepRow, TearsRow, Up};
+    use recording::{Closing, LogOptions, LogWriter, RunDescription, StepRow, TearsRow, Up};
 
     use super::*;
 
@@ -202,7 +202,7 @@ mod tests {
     }
 
     /// Returns the report on a file with the headers of two snapshots.
-    fn report(indices: [Option<u32>; 2], closing: Option<&Closing>) -> (Info, String) {
+    fn report(indices: [u32; 2], closing: Option<&Closing>) -> (Info, String) {
         let rows = (0..).zip(indices);
         let rows =
             rows.map(|(step, index)| StepRow { step, snapshot_index: index, ..StepRow::default() });
@@ -215,21 +215,18 @@ mod tests {
 
     #[test]
     fn every_message_of_the_file_is_counted() {
-        let (info, _) = report([Some(0), Some(1)], None);
+        let (info, _) = report([0, 1], None);
         assert_eq!((info.messages["/tf"], info.messages["/steps"]), (1, 2));
         assert_eq!(info.messages.values().sum::<u64>(), 3);
     }
 
     #[test]
-    fn the_losses_of_a_file_without_an_end_are_unknown_if_its_snapshots_have_no_numbers() {
-        let (info, lost) = report([None, None], None);
-        assert_eq!(info.lost_unknown, ["/steps", "/particles"]);
-        assert_eq!(lost, "lost        /steps unknown, /particles unknown, as far as the file goes");
-        let (_, lost) = report([Some(4), Some(5)], None);
+    fn the_losses_of_a_file_without_an_end_follow_from_the_numbers_of_its_snapshots() {
+        let (_, lost) = report([4, 5], None);
         assert_eq!(lost, "lost        none, as far as the file goes");
-        let (_, lost) = report([Some(4), Some(6)], None);
+        let (_, lost) = report([4, 6], None);
         assert_eq!(lost, "lost        /particles 1, /steps 1, as far as the file goes");
-        let (_, lost) = report([None, None], Some(&Closing::default()));
+        let (_, lost) = report([4, 5], Some(&Closing::default()));
         assert_eq!(lost, "lost        none");
     }
 
@@ -249,7 +246,7 @@ mod tests {
                 torn_count: if step < 45 { 1 } else { 3 },
                 wake_late_ns: measured * step * 1000,
                 solve_ns: measured * 30_000_000,
-                snapshot_index: u32::try_from(step).ok(),
+                snapshot_index: u32::try_from(step).unwrap(),
                 ..StepRow::default()
             };
             messages.extend(snapshot(row).map(|message| (message, log_time_ns)));

@@ -20,7 +20,7 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use anyhow::{anyhow, bail};
-use recorder::{Existing, PartFile, Topic, counted};
+use recording::{Existing, PartFile, counted};
 use sim_contract::clock::{SECOND_NS, monotonic_ns, realtime_ns, sleep_until};
 use sim_contract::{
     AttachError, Domain, Endpoint, LockstepError, NodeAnswer, OwnerState, SNAPSHOTS_BUFFERED, Stop,
@@ -78,7 +78,7 @@ pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
         bail!("nothing was recorded: no node has come up as {endpoint}");
     };
     let selection = args.selection.selection();
-    if selection.has_topic(Topic::Forces) {
+    if selection.has_forces {
         tap.read_forces()?;
     }
     let queue_bytes = usize::try_from(args.queue_bytes).unwrap_or(usize::MAX / 2);
@@ -109,7 +109,7 @@ pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
 
     let queue = Arc::new(Queue::new(queue_bytes));
     let position = Arc::new(WritePosition::default());
-    let intake = Intake::new(args.steps).with_energy(selection.has_energy());
+    let intake = Intake::new(args.steps).with_energy(selection.has_energy);
     let writing = writing::start(Arc::clone(&queue), Arc::clone(&position), options, file)?;
     let live = LiveLine::new(Arc::clone(&queue), Arc::clone(&position), args.progress);
     let feed = Feed::new(intake, Arc::clone(&queue), Arc::clone(&position), args.split.clone());

@@ -6,7 +6,7 @@ use std::fs::File;
 use std::path::PathBuf;
 
 use anyhow::Context;
-use recorder::{
+use recording::{
     AfterEnd, Finding, LoadRows, PartFile, ReadError, RepairReport, Topic, counted, load_rows,
     open_regular_file, repair_file,
 };

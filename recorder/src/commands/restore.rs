@@ -6,10 +6,9 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context, bail};
-use recorder::verification::Resimulation;
-use recorder::{
-    ContentSelection, FindStateError, Frame, FrameReader, LogReader, StatePlace, Wanted,
-    find_state, recorded_scene,
+use recording::verification::Resimulation;
+use recording::{
+    FindStateError, Frame, FrameReader, LogReader, StatePlace, Wanted, find_state, recorded_scene,
 };
 use serde::Serialize;
 use sim_contract::{
@@ -93,8 +92,6 @@ pub(crate) fn run(args: &RestoreArgs) -> anyhow::Result<Exit> {
     let mut client = Client::attach(&endpoint)?;
     let path = path_text(&args.file);
     let log = LogReader::open_until(&args.file, &stop).with_context(|| path.clone())?;
-    let needed = log.selection().require(&ContentSelection::FOR_STATES, "`recorder restore`");
-    needed.with_context(|| path.clone())?;
     check_scene(&mut client, args.timeout, &log).with_context(|| path.clone())?;
     let wanted = match (args.step, args.time) {
         (Some(step), _) => Wanted::Step(step),

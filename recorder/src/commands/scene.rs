@@ -4,7 +4,7 @@ use std::io::{self, IsTerminal};
 use std::path::PathBuf;
 
 use anyhow::{Context, bail};
-use recorder::{LogReader, PartFile};
+use recording::{LogReader, PartFile};
 use sim_contract::printable;
 
 use crate::cli::exit::Exit;
@@ -52,7 +52,7 @@ mod tests {
     use std::path::Path;
 
     use clap::Parser;
-    use recorder::{LogOptions, LogWriter, RunDescription, Up};
+    use recording::{LogOptions, LogWriter, RunDescription, Up};
 
     use super::*;
 

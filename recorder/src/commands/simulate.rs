@@ -8,11 +8,11 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::error::ErrorKind;
-use recorder::simulation::{
+use recording::simulation::{
     Job, SimulationResult, Start, State, States, StepCount, begin_log, finish_log, recording_bytes,
     simulate,
 };
-use recorder::{
+use recording::{
     ContentSelection, LogEnd, LogOptions, LogReader, OutcomeRow, PartFile, TimedCommand, WriteError,
 };
 use serde::Serialize;
@@ -302,9 +302,8 @@ fn truncation(args: &SimulateArgs) -> String {
 
 fn begin(args: &SimulateArgs, path: &Path, job: &Job, solver: &Solver) -> anyhow::Result<LogFile> {
     let file = args.file.create(path)?;
-    let selection = ContentSelection::default();
-    let selection = if args.forces { selection.with_forces() } else { selection };
-    let selection = if args.energy { selection.with_energy() } else { selection };
+    let (has_forces, has_energy) = (args.forces, args.energy);
+    let selection = ContentSelection { has_forces, has_energy, ..ContentSelection::default() };
     let options = LogOptions { selection, ..args.file.options() };
     let log = begin_log(file, options, &job.description(solver), &job.scene);
     log.with_context(|| truncation(args))
@@ -439,7 +438,7 @@ impl fmt::Display for Summary {
 
 #[cfg(test)]
 mod tests {
-    use recorder::parse_commands;
+    use recording::parse_commands;
     use sim_solver::builtin;
 
     use super::*;

@@ -5,10 +5,10 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use recorder::verification::{
+use recording::verification::{
     StepGap, StepRange, Verdict, VerifyError, VerifyOptions, VerifyReport, verify,
 };
-use recorder::{IntactParts, LogEnd, LogReader, ReadError, Wanted, find_state};
+use recording::{IntactParts, LogEnd, LogReader, ReadError, Wanted, find_state};
 use sim_contract::{Stop, printable_line};
 
 use crate::cli::damaged_input::{DamagedInput, intact_parts, lacks, lacks_state};
@@ -16,13 +16,13 @@ use crate::cli::exit::Exit;
 use crate::cli::output::{self, AsJson};
 use crate::cli::parse::whole_number;
 use crate::cli::progress::progress_bytes;
-use crate::cli::thread_args::ThreadArgs;
+use crate::cli::thread_args::PartArgs;
 
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Compares everything that a recorder writes, also where the checksums are gone, \
-    and lists the messages that are missing. --verbose also lists the content that is not compared, because \
-    nothing else in the file can contradict it. Of a damaged recording, compares what `recorder repair` would save. Behind missing outcomes, it goes on from the next complete state.\n\n\
+    after_help = "Simulates the parts between complete states (a snapshot with its keyframe) side by side, compares every \
+    state, and lists the messages that are missing. --verbose also lists the content that no state depends on, which is \
+    not compared. Of a damaged recording, compares what `recorder repair` would save. Behind missing outcomes, it goes on from the next complete state.\n\n\
     Exit codes: 0 every recorded step is bit-identical, or there is none to compare; 1 not verifiable; 3 different, outcomes missing, or file truncated \
     or damaged.\n\nExamples:\n  \
     recorder verify run.mcap\n  \
@@ -42,7 +42,7 @@ pub(crate) struct VerifyArgs {
     #[arg(short, long)]
     verbose: bool,
     #[command(flatten)]
-    threads: ThreadArgs,
+    threads: PartArgs,
     #[command(flatten)]
     as_json: AsJson,
 }
@@ -91,7 +91,7 @@ fn explain(error: VerifyError, path: &Path) -> anyhow::Error {
 }
 
 impl VerifyArgs {
-    fn verify<R: Read + Send>(
+    fn verify<R: Read>(
         &self,
         open: impl Fn() -> Result<LogReader<R>, ReadError>,
         stop: &Stop,

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use recorder::Existing;
+use recording::Existing;
 
 /// Most files of one call. A higher number is probably a mistake.
 const FILES_MAX: usize = 10_000;

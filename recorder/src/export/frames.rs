@@ -1,7 +1,7 @@
 //! Frames of an export: the selected snapshots, or evenly spaced moments between them.
 
 use glam::DQuat;
-use recorder::{ColliderRow, SceneState, ShapeRow};
+use recording::{ColliderRow, SceneState, ShapeRow};
 use sim_contract::{ParticleState, PlainF32};
 
 use super::snapshots::Snapshots;

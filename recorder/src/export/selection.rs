@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use anyhow::bail;
-use recorder::RunDescription;
+use recording::RunDescription;
 
 /// The snapshots to export. Times are simulated times.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]

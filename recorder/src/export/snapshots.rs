@@ -5,7 +5,7 @@ use std::io::Read;
 use std::ops::ControlFlow;
 
 use anyhow::bail;
-use recorder::{OutcomeRow, RunDescription, SceneState};
+use recording::{OutcomeRow, RunDescription, SceneState};
 use sim_solver::Scene;
 use sim_solver::scene::Up;
 

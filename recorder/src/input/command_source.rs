@@ -3,10 +3,9 @@
 use std::path::Path;
 
 use anyhow::{Context, bail};
-use recorder::simulation::Start;
-use recorder::{
-    LogEnd, LogReader, Message, OutcomeRow, StepRow, TimedCommand, Topic, parse_commands,
-    sort_commands,
+use recording::simulation::Start;
+use recording::{
+    LogEnd, LogReader, Message, OutcomeRow, StepRow, TimedCommand, parse_commands, sort_commands,
 };
 use sim_contract::Stop;
 
@@ -42,7 +41,6 @@ impl CommandSource {
 
     fn from_recording(source: &str, stop: &Stop) -> anyhow::Result<Self> {
         let mut log = LogReader::open_until(Path::new(source), stop)?;
-        log.selection().require(&[Topic::Outcomes], "`recorder simulate --commands`")?;
         let mut start = None;
         let mut commands = Vec::new();
         while let Some(logged) = log.next_message()? {
@@ -106,7 +104,7 @@ pub(crate) fn timed_command(row: &OutcomeRow) -> TimedCommand {
 mod tests {
     use std::fs;
 
-    use recorder::{Closing, LogOptions, LogWriter, RunDescription, Up};
+    use recording::{Closing, LogOptions, LogWriter, RunDescription, Up};
     use sim_contract::Action;
 
     use super::*;

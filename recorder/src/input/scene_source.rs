@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use anyhow::{Context, anyhow};
-use recorder::{LogReader, recorded_scene};
+use recording::{LogReader, recorded_scene};
 use sim_contract::{Stop, read_scene_file};
 use sim_solver::Scene;
 use sim_solver::scene::LoadError;

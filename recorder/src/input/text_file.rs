@@ -3,7 +3,7 @@
 use std::io::{self, ErrorKind, Read};
 use std::path::Path;
 
-use recorder::open_regular_file;
+use recording::open_regular_file;
 use sim_contract::to_text;
 
 /// Reads a regular file of at most `size_bytes_max` bytes.

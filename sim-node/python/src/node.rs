@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
-use recorder::{CollidersRow, StatusRow};
+use recording::{CollidersRow, StatusRow};
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{Client, Endpoint, OwnerState, ReadError, Reason, RequestError, SnapshotHeader};
 

@@ -3,8 +3,8 @@
 use numpy::{PyArray1, PyArray3, PyArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use recorder::SceneState;
-use recorder::pictures::{
+use recording::SceneState;
+use recording::pictures::{
     Bend, Extent, ExtentTracker, PictureOptions, Renderer, Size, Style, View, rasterize,
 };
 use sim_solver::Scene;

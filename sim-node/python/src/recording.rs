@@ -8,7 +8,7 @@ use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use recorder::{
+use recording::{
     LogReader, Message, ReadError, RunDescription, SceneState, SceneStateError, StepRow, Tape,
     TapeError, TapeState, complete_state,
 };
@@ -122,7 +122,7 @@ fn header(run: &RunDescription, state: &TapeState) -> SnapshotHeader {
         topology_revision: row.topology_revision,
         torn_count: row.torn_count,
         particle_count: run.particle_count,
-        snapshot_index: row.snapshot_index.unwrap_or(0),
+        snapshot_index: row.snapshot_index,
         ..SnapshotHeader::default()
     }
 }
@@ -195,7 +195,7 @@ impl Recording {
         Topology::new(py, &header, &constraints)
     }
 
-    /// Returns the bends. A recording of format 5 or earlier does not list them.
+    /// Returns the bends.
     fn bends(&self, py: Python<'_>) -> PyResult<Bends> {
         let bends = self.with(|tape| Ok(tape.topology().bends()))?;
         Bends::new(py, &bends.ok_or_else(|| self.malformed("/topology"))?)

@@ -7,8 +7,8 @@ use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::exceptions::{PyMemoryError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
-use recorder::simulation::{SteppedRecording, apply, colliders_row, forces_row, recording_bytes};
-use recorder::{Existing, RunDescription, SceneState, bend_state, constraint_state};
+use recording::simulation::{SteppedRecording, apply, colliders_row, forces_row, recording_bytes};
+use recording::{Existing, RunDescription, SceneState, bend_state, constraint_state};
 use sim_contract::clock::monotonic_ns;
 use sim_contract::{
     LoadHeader, ParticleState, RestoreContents, SnapshotHeader, Triangle, scene_hash,

@@ -5,18 +5,19 @@ use std::path::{Path, PathBuf};
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use recorder::verification::{Difference, StepRange, Verdict, VerifyOptions, VerifyReport};
-use recorder::{LogReader, Wanted, find_state};
+use recording::verification::{Difference, StepRange, Verdict, VerifyOptions, VerifyReport};
+use recording::{LogReader, Wanted, find_state};
 use sim_contract::Stop;
 
 use crate::arguments;
 use crate::error::recording_error;
 use crate::patience::run_until_signal;
 
-/// Simulates a recording again and compares every bit, up to the first difference.
+/// Simulates a recording again and compares every state, up to the first difference.
 ///
 /// `start` is the first step to compare, and `stop` the step after the last one. The simulation starts at the
-/// last complete state up to `start`. Other threads of the interpreter run meanwhile; Ctrl-C ends it.
+/// last complete state up to `start`. `threads` parts of the recording are simulated at the same time. Other threads of
+/// the interpreter run meanwhile; Ctrl-C ends it.
 ///
 /// Raises `RecordingError` if the file cannot be read, or has no complete state to start from.
 #[pyfunction]
@@ -55,7 +56,7 @@ fn verify_file(path: &Path, options: VerifyOptions, signal: &Stop) -> PyResult<V
         range.start = place.map_err(|error| recording_error(path, &error))?.keyframe_step;
     }
     let options = VerifyOptions { threads, range };
-    let report = recorder::verification::verify(open()?, options, signal.flag(), |_| ());
+    let report = recording::verification::verify(open()?, options, signal.flag(), |_| ());
     report.map_err(|error| recording_error(path, &error))
 }
 

@@ -21,7 +21,7 @@ def test_a_recording_is_proved_whole_and_in_parts(simulate: Simulate) -> None:
     assert proof.is_identical and proof.verdict == "identical" and proof.end == "complete"
     assert (proof.first_step, proof.last_identical_step, proof.steps_identical) == (0, 600, 600)
     assert (proof.gaps, proof.lost, proof.step, proof.what, proof.particle) == ([], {}, None, None, None)
-    assert any("log_time" in what for what in proof.not_covered)
+    assert any("measured times" in what for what in proof.not_covered)
     assert str(proof) == "600 steps bit-identical (0..=600)"
     part = catenary.verify(path, start=300, stop=401, threads=2)
     # The last complete state before step 300 is that of step 240.

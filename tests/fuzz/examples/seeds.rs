@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use fuzz::mcap_file::{END_OF_CHUNK, SEPARATOR, with_messages};
 use fuzz::simulation::SCENES;
-use recorder::{FrameReader, LogReader, Message, MessageEncoder, TimedCommand, parse_commands};
+use recording::{FrameReader, LogReader, Message, MessageEncoder, TimedCommand, parse_commands};
 use sim_contract::{Action, Command};
 use sim_solver::builtin;
 

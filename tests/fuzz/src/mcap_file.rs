@@ -3,7 +3,7 @@
 //! An input is a sequence of messages with [`SEPARATOR`] between them. The first byte of a message
 //! selects its topic, and bit 7 of it ends a chunk. The second byte is the step. The payload follows.
 
-use recorder::{LogOptions, LogWriter, RunDescription, Topic, Up};
+use recording::{LogOptions, LogWriter, RunDescription, Topic, Up};
 
 /// Bytes between two messages. 0xff occurs neither in JSON nor in most other payloads.
 pub const SEPARATOR: &[u8] = b"\xff\xfe\xff";

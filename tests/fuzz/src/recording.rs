@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::Write;
 use std::os::fd::{AsRawFd, OwnedFd};
 
-use recorder::{
+use recording::{
     Closing, Compression, FrameReader, LogEnd, LogOptions, LogReader, LogWriter, Message,
     RunDescription, Tape,
 };
@@ -15,12 +15,11 @@ const STEPS_MAX: usize = 32;
 
 /// Reads a file in all three ways, and checks that they agree.
 pub fn check(file: &[u8]) {
-    let Ok(log) = LogReader::new(file) else {
+    let Ok(mut log) = LogReader::new(file) else {
         // The tape reads the same header.
         assert!(Tape::open(&memory_file(file).1, None, &mut |_, _| {}).is_err());
         return;
     };
-    let mut log = log.with_audit();
     let mut messages = Vec::new();
     let mut is_valid = true;
     loop {
@@ -42,7 +41,7 @@ pub fn check(file: &[u8]) {
 
 /// The snapshots of the frames are those of the messages, as far as both go.
 fn check_frames(file: &[u8], messages: &[Message]) {
-    let Ok(log) = LogReader::new(file) else { unreachable!("the header was readable") };
+    let Ok(mut log) = LogReader::new(file) else { unreachable!("the header was readable") };
     let mut frames = FrameReader::new(log);
     let mut snapshots =
         messages.iter().filter(|message| matches!(message, Message::Particles { .. }));

@@ -2,7 +2,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use recorder::{TimedCommand, parse_commands, sort_commands};
+use recording::{TimedCommand, parse_commands, sort_commands};
 
 fuzz_target!(|text: &str| {
     let Ok(commands) = parse_commands(text, "commands.jsonl") else { return };

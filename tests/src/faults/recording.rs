@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use recorder::{LogReader, Message, StepRow, Topic};
+use recording::{LogReader, Message, StepRow, Topic};
 use serde_json::Value;
 
 use crate::finished::Finished;
@@ -80,7 +80,7 @@ impl Recording {
     /// Number of snapshots that were published from the first to the last recorded one, without those in
     /// the file.
     fn missing(&self) -> Option<u64> {
-        let (first, last) = (self.rows.first()?.snapshot_index?, self.rows.last()?.snapshot_index?);
+        let (first, last) = (self.rows.first()?.snapshot_index, self.rows.last()?.snapshot_index);
         let published = u64::from(last.wrapping_sub(first)) + 1;
         Some(published - self.rows.len() as u64)
     }

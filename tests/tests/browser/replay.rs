@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use integration_tests::{Process, Program, Sandbox, ctl, record, wait_for};
-use recorder::{FrameReader, LogReader};
+use recording::{FrameReader, LogReader};
 
 use crate::browser::picture::{ERROR_MAX, NAMED, SWINGING, errors};
 use crate::browser::support::{Area, Button, ReplayRig, is_cloth, is_ghost};

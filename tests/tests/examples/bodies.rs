@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use integration_tests::{Process, Program, Sandbox, ctl};
-use recorder::{LogReader, Message};
+use recording::{LogReader, Message};
 use serde_json::Value;
 
 const SCENE: &str = include_str!("../../../examples/bodies/bodies.toml");

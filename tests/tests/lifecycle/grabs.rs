@@ -5,7 +5,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use integration_tests::{DEADLINE, Process, Program, Sandbox, Signal, ctl, record, wait_for};
-use recorder::{LogReader, Message, OutcomeRow};
+use recording::{LogReader, Message, OutcomeRow};
 use sim_contract::{Action, Client, Outcome, ParticleFlags, Tap, Update};
 
 /// The client id of every grabber.

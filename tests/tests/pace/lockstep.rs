@@ -7,7 +7,7 @@ use std::thread;
 
 use fastrand::Rng;
 use integration_tests::{DEADLINE, Process, Program, Sandbox, Signal, ctl, wait_for};
-use recorder::{LogReader, Message};
+use recording::{LogReader, Message};
 use sim_contract::clock::{monotonic_ns, sleep_until};
 use sim_contract::{Action, Client, Endpoint, GivenState, RequestError, Snapshot, SnapshotFlags};
 
@@ -430,7 +430,7 @@ fn a_recording_and_a_watch_name_each_member_that_joins_leaves_or_is_dropped() {
     assert!(last.starts_with(&["joined", "timed_out"]), "{last:?}");
     assert!(last.ends_with(&["joined", "left"]), "{last:?}");
     let verified = Process::run(Program::Recorder, &sandbox, &["verify", "-v", &file]).success();
-    assert!(verified.contains("the members of the lockstep in /events"), "{verified}");
+    assert!(verified.contains("messages on /status and /events"), "{verified}");
     killed.wait();
     watch.interrupt();
     node.interrupt().success();

@@ -8,7 +8,7 @@ use std::time::Duration;
 use integration_tests::{
     DEADLINE, Finished, Process, Program, Sandbox, Signal, ctl, record, wait_for,
 };
-use recorder::{Closing, Frame, FrameReader, LogOptions, LogReader, LogWriter, Message};
+use recording::{Closing, Frame, FrameReader, LogOptions, LogReader, LogWriter, Message};
 use sim_contract::{Action, Client, SnapshotFlags, SnapshotHeader, Tap};
 
 fn node(sandbox: &Sandbox, args: &[&str]) -> Process {

@@ -9,7 +9,7 @@ mod selection;
 use std::path::Path;
 
 use integration_tests::{DEADLINE, Finished, Process, Program, Sandbox, Signal, ctl, wait_for};
-use recorder::{LogReader, Message, StepRow};
+use recording::{LogReader, Message, StepRow};
 use serde_json::{Value, json};
 use sim_contract::{Action, Client};
 

@@ -2,7 +2,7 @@
 //! an address space that does not hold what they claim.
 
 use integration_tests::{Finished, Process, Program, Sandbox};
-use recorder::{Closing, LogOptions, LogReader, LogWriter, Message, RunDescription};
+use recording::{Closing, LogOptions, LogReader, LogWriter, Message, RunDescription};
 
 use super::raw::{CHUNK, MAGIC, position_of, record, small};
 

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::path::Path;
 
 use integration_tests::{DEADLINE, Finished, Process, Program, Sandbox, Signal, ctl, wait_for};
-use recorder::{Closing, LogOptions, LogReader, LogWriter, Message};
+use recording::{Closing, LogOptions, LogReader, LogWriter, Message};
 use sim_contract::{Action, Client, KEYFRAMES_BUFFERED, SNAPSHOTS_BUFFERED};
 
 /// Single steps that a stopped recorder misses, beyond those that its buffer holds.

@@ -5,7 +5,7 @@ use std::path::Path;
 use integration_tests::{
     Finished, Process, Program, Sandbox, Stream, Streams, ctl, record, wait_for,
 };
-use recorder::{LogEnd, LogReader};
+use recording::{LogEnd, LogReader};
 
 /// Limit on the size of files: several chunks, and less than any of the recordings here.
 const SIZE_LIMIT_BYTES: u64 = 4_000_000;

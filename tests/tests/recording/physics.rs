@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use integration_tests::{Process, Program, Sandbox, record, wait_for};
-use recorder::{Frame, FrameReader, LogReader, Message, StepRow};
+use recording::{Frame, FrameReader, LogReader, Message, StepRow};
 
 use super::losses::recorded_steps;
 
@@ -112,13 +112,10 @@ fn a_late_recording_with_tears_a_reset_and_a_load_verifies_and_plays_back_row_fo
     let two = frames(&second);
     assert_eq!(side_rows(&two), side_rows(&one));
     // The replay is a run of its own, which numbers its snapshots from 0.
-    let row = |(index, frame): (u32, &Frame)| {
-        assert!(frame.row.snapshot_index.is_some());
-        StepRow { snapshot_index: Some(index), ..frame.row }
-    };
+    let row = |(index, frame): (u32, &Frame)| StepRow { snapshot_index: index, ..frame.row };
     let rows = |frames: &[Frame]| (0..).zip(frames).map(row).collect::<Vec<_>>();
     assert_eq!(rows(&two), rows(&one));
-    assert!((0..).zip(&two).all(|(index, frame)| frame.row.snapshot_index == Some(index)));
+    assert!((0..).zip(&two).all(|(index, frame)| frame.row.snapshot_index == index));
     assert_verifies(&sandbox, &second);
 }
 

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use integration_tests::storm::{self, HeldState, Storm};
 use integration_tests::{DEADLINE, Finished, Process, Program, Sandbox, ctl, record, wait_for};
-use recorder::{Frame, FrameReader, LogReader, Message};
+use recording::{Frame, FrameReader, LogReader, Message};
 use sim_contract::{
     Action, Client, GivenState, Outcome, ParticleFlags, ParticleState, Reason, RestoreContents, Tap,
 };

@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use integration_tests::{Finished, Process, Program, Sandbox};
-use recorder::{LogReader, Message};
+use recording::{LogReader, Message};
 
 /// A sheet that is big enough for several threads, falls onto a ball, and tears there.
 const SCENE: &str = r#"

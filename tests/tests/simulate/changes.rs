@@ -4,7 +4,7 @@
 use std::fs;
 
 use integration_tests::{Finished, Sandbox, ctl};
-use recorder::{Frame, Message, OutcomeRow};
+use recording::{Frame, Message, OutcomeRow};
 
 use super::{frames, node, record, recorder, step, wait_for_step};
 

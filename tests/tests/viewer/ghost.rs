@@ -6,7 +6,7 @@ use std::fs;
 use std::path::Path;
 
 use integration_tests::{Process, Program, Sandbox};
-use recorder::{Closing, FrameReader, LogOptions, LogReader, LogWriter, Message as Logged};
+use recording::{Closing, FrameReader, LogOptions, LogReader, LogWriter, Message as Logged};
 use serde_json::{Value, json};
 use sim_contract::ParticleState;
 use viewer_bridge::wire::{Ghost, Message};

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::time::{Duration, SystemTime};
 
 use integration_tests::{Process, Program, Sandbox, ctl, record};
-use recorder::{Frame, FrameReader, LogReader, Message as Logged, RunDescription};
+use recording::{Frame, FrameReader, LogReader, Message as Logged, RunDescription};
 use serde_json::{Value, json};
 use sim_contract::ParticleFlags;
 use viewer_bridge::wire::frame_flag::PAUSED;
@@ -217,8 +217,8 @@ fn change_one_particle(from: &str, to: &str, changed_step: u64) {
     let mut log = LogReader::open(Path::new(from)).unwrap();
     let (run, scene) = (log.run().clone(), log.scene().to_vec());
     let out = std::fs::File::create(to).unwrap();
-    let options = recorder::LogOptions::default();
-    let mut copy = recorder::LogWriter::create(out, options, &run, &scene, 0).unwrap();
+    let options = recording::LogOptions::default();
+    let mut copy = recording::LogWriter::create(out, options, &run, &scene, 0).unwrap();
     while let Some(mut logged) = log.next_message().unwrap() {
         if let Logged::Particles { step, particles } = &mut logged.message
             && *step == changed_step
@@ -227,7 +227,7 @@ fn change_one_particle(from: &str, to: &str, changed_step: u64) {
         }
         copy.write(&logged.message, logged.log_time_ns).unwrap();
     }
-    copy.finish(&recorder::Closing::default()).unwrap();
+    copy.finish(&recording::Closing::default()).unwrap();
 }
 
 #[test]

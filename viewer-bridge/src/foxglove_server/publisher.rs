@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use foxglove::messages::{FrameTransform, PointCloud, SceneUpdate};
 use foxglove::{Context, Encode, FoxgloveError, PartialMetadata, RawChannel, Schema, SinkId};
-use recorder::{
+use recording::{
     CollidersRow, DrawnMesh, Message, MessageEncoder, OutcomeRow, RunDescription, SCENE_TOPIC,
     SceneDrawing, StatusRow, StepRow, SurfaceRow, TearsRow, Topic, TopicFormat, TopologyRow, Up,
     encode_transform, scene_format,

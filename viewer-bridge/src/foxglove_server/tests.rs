@@ -9,7 +9,7 @@ use foxglove::{
     ChannelId, Context, Decode, Encode, FoxgloveError, Metadata, RawChannel, Sink, SinkId,
 };
 use prost_types::{FileDescriptorProto, FileDescriptorSet};
-use recorder::{StepRow, Topic, TopicFormat, scene_format};
+use recording::{StepRow, Topic, TopicFormat, scene_format};
 use serde_json::{Value, json};
 use sim_contract::clock::SECOND_NS;
 use sim_contract::{ColliderShape, ColliderState, ParticleState, TornConstraint};

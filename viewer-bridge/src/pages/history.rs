@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use bytes::Bytes;
-use recorder::OutcomeRow;
+use recording::OutcomeRow;
 
 use super::connection::Wishes;
 use super::frame_set::FrameSet;

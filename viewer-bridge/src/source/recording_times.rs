@@ -1,6 +1,6 @@
 //! Times of the steps of a recording.
 
-use recorder::RunDescription;
+use recording::RunDescription;
 use sim_contract::clock::SECOND_NS;
 
 /// Times of the steps of a recording.

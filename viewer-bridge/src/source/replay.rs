@@ -19,7 +19,7 @@ use std::sync::mpsc::channel;
 use std::thread;
 
 use anyhow::Context;
-use recorder::ReadError;
+use recording::ReadError;
 use sim_contract::Stop;
 
 use super::feed::Source;

@@ -5,7 +5,7 @@ use std::net::{SocketAddr, TcpStream};
 use std::sync::Arc;
 use std::time::Duration;
 
-use recorder::StepRow;
+use recording::StepRow;
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 use serde_json::Value;
 use sim_contract::clock::{SECOND_NS, monotonic_ns, sleep_until};

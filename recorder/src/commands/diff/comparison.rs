@@ -4,8 +4,8 @@ use std::cmp::Ordering;
 use std::collections::VecDeque;
 
 use anyhow::{Context, bail};
-use recorder::verification::{SnapshotDifference, snapshot_difference};
-use recorder::{FileSource, Frame, FrameReader, LogEnd, Message, OutcomeRow};
+use recording::verification::{SnapshotDifference, snapshot_difference};
+use recording::{FileSource, Frame, FrameReader, LogEnd, Message, OutcomeRow};
 use serde_json::Value;
 use sim_contract::{Action, ParticleState};
 

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use recorder::verification::distance;
+use recording::verification::distance;
 use serde::Serialize;
 use sim_contract::ParticleState;
 

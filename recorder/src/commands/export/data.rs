@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::Path;
 
-use recorder::{Existing, counted};
+use recording::{Existing, counted};
 use serde::Serialize;
 
 use crate::cli::output;

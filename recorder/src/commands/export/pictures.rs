@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::time::Duration;
 
-use recorder::Existing;
-use recorder::pictures::{ExtentTracker, PictureOptions, Renderer, View};
+use recording::Existing;
+use recording::pictures::{ExtentTracker, PictureOptions, Renderer, View};
 use serde::Serialize;
 
 use super::data::Written;

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::io::Read;
 
 use anyhow::{Context, bail};
-use recorder::{
+use recording::{
     FrameReader, LogEnd, LogReader, Message, RunDescription, ShapeRow, StepRow, recorded_scene,
 };
 use sim_solver::Scene;

@@ -9,11 +9,11 @@ use std::io::Cursor;
 use std::sync::atomic::AtomicBool;
 
 use clap::Parser;
-use recorder::pictures::{
+use recording::pictures::{
     Basis, Camera, ExtentTracker, Picture, Renderer, Shape, encode_png, encode_svg,
 };
-use recorder::simulation::{Job, States, simulate};
-use recorder::{Closing, Existing, LogOptions, LogWriter, Message, RunDescription, StepRow, Up};
+use recording::simulation::{Job, States, simulate};
+use recording::{Closing, Existing, LogOptions, LogWriter, Message, RunDescription, StepRow, Up};
 use sim_contract::{ConstraintState, ParticleFlags, ParticleState, Triangle};
 use sim_solver::{Scene, Solver};
 
@@ -85,7 +85,7 @@ fn record_with_text(scene: &str, steps: u64, text: &str) -> Vec<u8> {
 /// Records a scene with commands from a file.
 fn record_commands(scene: &str, commands: &str, steps: u64) -> Vec<u8> {
     let scene = Scene::from_toml(scene, "test").unwrap();
-    let commands = recorder::parse_commands(commands, "test").unwrap();
+    let commands = recording::parse_commands(commands, "test").unwrap();
     let job = Job::new(scene, commands, steps);
     let solver = Solver::new(&job.scene);
     let (run, toml) = (job.description(&solver), job.scene.to_toml());

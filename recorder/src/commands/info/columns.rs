@@ -1,7 +1,7 @@
 //! The times of the steps, condensed to the columns of a graph.
 
 use hdrhistogram::Histogram;
-use recorder::StepRow;
+use recording::StepRow;
 
 use super::timing::{histogram, is_measured};
 

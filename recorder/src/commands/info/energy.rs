@@ -5,9 +5,8 @@ use std::io::Read;
 use std::ops::ControlFlow;
 
 use anyhow::Context;
-use recorder::{
-    ContentSelection, EnergyRow, FrameReader, LogReader, SceneState, SceneStateError,
-    recorded_scene, visit_states,
+use recording::{
+    EnergyRow, FrameReader, LogReader, SceneState, SceneStateError, recorded_scene, visit_states,
 };
 use serde::Serialize;
 use sim_solver::{EnergyMeter, Scene};
@@ -46,7 +45,7 @@ impl EnergyReport {
         let scene = recorded_scene(&log)?;
         let unit = scene.energy_unit();
         let range =
-            if log.selection().has_energy() { recorded(log)? } else { measured(log, &scene)? };
+            if log.selection().has_energy { recorded(log)? } else { measured(log, &scene)? };
         Ok(Self { unit, range: range.context("no snapshot has an energy")? })
     }
 }
@@ -63,10 +62,7 @@ fn recorded<R: Read>(log: LogReader<R>) -> anyhow::Result<Option<EnergyRange>> {
 }
 
 fn measured<R: Read>(log: LogReader<R>, scene: &Scene) -> anyhow::Result<Option<EnergyRange>> {
-    const PURPOSE: &str = "`recorder info --energy`";
-    let selection = log.selection();
-    selection.require(&ContentSelection::FOR_ENERGY, PURPOSE)?;
-    selection.require_all_particles(PURPOSE)?;
+    log.selection().require_all_particles("`recorder info --energy`")?;
     let mut meter = EnergyMeter::new(scene);
     let mut range = None;
     visit_states(log, None, |state: &SceneState| {

@@ -3,7 +3,7 @@
 use glam::DVec2;
 
 use super::columns::{Column, Columns};
-use recorder::pictures::{Color, Dash, Picture, Shape, Size, Stroke, Text};
+use recording::pictures::{Color, Dash, Picture, Shape, Size, Stroke, Text};
 
 /// Most columns of a graph: one for each pixel of its width.
 pub(super) const COLUMNS_MAX: usize = 840;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
-use recorder::{RunDescription, counted};
+use recording::{RunDescription, counted};
 use serde::Serialize;
 use sim_contract::printable_line;
 
@@ -45,9 +45,6 @@ pub(crate) struct Info {
     /// Messages that the recorder lost or that never reached it, for topics with such messages, and
     /// "unreadable" ones. In a file without an end, only those that are missing between recorded ones.
     pub(super) lost: BTreeMap<&'static str, u64>,
-    /// Topics with an unknown number of missing messages: those of the snapshots in a file without an end,
-    /// of a format that does not number them.
-    pub(super) lost_unknown: Vec<&'static str>,
     /// Torn constraints in the first and in the last snapshot.
     pub(super) torn_count_first: Option<u32>,
     pub(super) torn_count_last: Option<u32>,
@@ -85,7 +82,6 @@ impl Info {
             messages: BTreeMap::new(),
             messages_per_s: BTreeMap::new(),
             lost: BTreeMap::new(),
-            lost_unknown: Vec::new(),
             torn_count_first: None,
             torn_count_last: None,
             last_state_hash: None,
@@ -165,9 +161,8 @@ impl Info {
 
     fn write_end(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let scope = if self.stop_reason.is_none() { ", as far as the file goes" } else { "" };
-        let unknown = self.lost_unknown.iter().map(|topic| format!("{topic} unknown"));
-        let known = self.lost.iter().map(|(topic, count)| format!("{topic} {count}"));
-        let lost = unknown.chain(known).collect::<Vec<_>>().join(", ");
+        let lost = self.lost.iter().map(|(topic, count)| format!("{topic} {count}"));
+        let lost = lost.collect::<Vec<_>>().join(", ");
         let lost = if lost.is_empty() { "none" } else { &lost };
         writeln!(f, "lost        {lost}{scope}")?;
         let reason = self.stop_reason.as_deref().unwrap_or("unknown");

@@ -2,7 +2,7 @@
 
 use std::io::Read;
 
-use recorder::{
+use recording::{
     Closing, GapCounter, LogEnd, LogReader, LoggedMessage, Message, RunDescription, StepRow, Topic,
 };
 
@@ -41,14 +41,12 @@ impl Survey {
     fn new<R: Read>(log: &LogReader<R>, mut info: Info) -> anyhow::Result<Self> {
         info.messages = Topic::ALL.map(|topic| (topic.name(), 0)).into();
         let selection = log.selection();
-        let has_all_particles =
-            selection.has_topic(Topic::Particles) && !selection.is_only_commands();
         Ok(Self {
             info,
             gaps: GapCounter::for_selection(selection),
             timing: TimingCollector::new(log.run().rate_hz)?,
             newest: None,
-            counted: if has_all_particles { Topic::Particles } else { Topic::Steps },
+            counted: if selection.is_only_commands { Topic::Steps } else { Topic::Particles },
             log_times_ns: None,
         })
     }
@@ -78,9 +76,10 @@ impl Survey {
         self.info.last_state_hash = row.map(|row| format!("{:016x}", row.state_hash));
     }
 
-    fn finish(mut self, run: &RunDescription, closing: Option<&Closing>, end: &LogEnd) -> Info {
-        self.count_lost(closing);
+    fn finish(self, run: &RunDescription, closing: Option<&Closing>, end: &LogEnd) -> Info {
         let mut info = self.info;
+        info.stop_reason = closing.map(|closing| closing.stop_reason.clone());
+        info.lost = self.gaps.lost(closing);
         info.file_end = end.to_string();
         info.timing = self.timing.timing();
         if let (Some(first), Some(last)) = (info.first_step, info.last_step) {
@@ -96,19 +95,5 @@ impl Survey {
             info.wall_clock_s = self.log_times_ns.map(duration_s);
         }
         info
-    }
-
-    /// Sets the losses: those that the end of the file states, or more if the file shows more.
-    fn count_lost(&mut self, closing: Option<&Closing>) {
-        let (info, gaps) = (&mut self.info, &self.gaps);
-        if closing.is_none() && gaps.has_unnumbered_snapshots() {
-            info.lost_unknown = [Topic::Steps, Topic::Particles].map(Topic::name).to_vec();
-        }
-        info.stop_reason = closing.map(|closing| closing.stop_reason.clone());
-        info.lost = closing.map(Closing::missing).unwrap_or_default();
-        for (topic, shown) in gaps.counts().iter().filter(|(_, shown)| shown.gaps > 0) {
-            let lost = info.lost.entry(topic.name()).or_default();
-            *lost = shown.gaps.max(*lost);
-        }
     }
 }

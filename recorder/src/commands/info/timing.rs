@@ -3,7 +3,7 @@
 use std::fmt;
 
 use hdrhistogram::Histogram;
-use recorder::StepRow;
+use recording::StepRow;
 use serde::Serialize;
 
 use super::bins::{Bars, Bin, Bins};

@@ -1,6 +1,6 @@
 //! The complete state of a step in the middle of a recording, simulated from the last keyframe before it.
 
-use recorder::{CompleteStateError, RecordedSceneError, Tape, complete_state};
+use recording::{CompleteStateError, RecordedSceneError, Tape, complete_state};
 use sim_contract::Stop;
 
 /// Most work of a simulation, in steps of one particle: about two seconds on one thread. A jump in a scene

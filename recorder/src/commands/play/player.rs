@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use recorder::Frame;
+use recording::Frame;
 use sim_contract::clock::{SECOND_NS, monotonic_ns, sleep_until};
 use sim_contract::{Action, Command, Endpoint, Owner, Reason, ReceivedCommand, Stop};
 
@@ -212,7 +212,7 @@ impl Player {
     /// the wait.
     fn publish(&mut self, replay: &mut Replay, frame: &Frame) -> anyhow::Result<Option<Frame>> {
         if replay.step().is_none() {
-            replay.publish_latched(frame.row.step)?;
+            replay.publish_latched()?;
         }
         replay.publish(frame)?;
         self.control.count_step();

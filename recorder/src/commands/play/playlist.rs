@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use anyhow::Context;
-use recorder::{ContentSelection, Frame, LogEnd, RunDescription, StepRow, counted};
+use recording::{ContentSelection, Frame, LogEnd, RunDescription, StepRow, counted};
 use sim_contract::Stop;
 use sim_contract::clock::SECOND_NS;
 
@@ -306,11 +306,7 @@ impl Junction {
         let (Some(last), Some(first)) = (self.last, readable_row(next, first_step)?) else {
             return Ok(false);
         };
-        let missing = match (last.snapshot_index, first.snapshot_index) {
-            (Some(last), Some(first)) => self.selection.missing_between(last, first),
-            // Older formats do not number their snapshots.
-            _ => 0,
-        };
+        let missing = self.selection.missing_between(last.snapshot_index, first.snapshot_index);
         if missing > 0 {
             let (one, two) = (before.path.display(), next.path().display());
             let snapshots = counted(missing, "snapshot");

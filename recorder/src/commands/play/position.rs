@@ -2,8 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use recorder::{CollidersRow, Message, OutcomeRow, StatusRow, TapeState, TearTracker};
-use sim_contract::{Action, Method, ParameterValues, Torn};
+use recording::{CollidersRow, Message, OutcomeRow, StatusRow, TapeState, TearTracker};
+use sim_contract::{Action, ParameterValues, Torn};
 use sim_solver::Keyframe;
 
 /// The state of a replay after the messages so far, as far as `/steps` does not contain it.
@@ -25,15 +25,11 @@ pub(crate) struct Position {
     pub(super) rejected_count: u64,
     pub(super) tears: TearTracker,
     pub(super) parameters: ParameterValues,
-    /// The recording has `/parameters`. Older formats have parameters only in keyframes.
-    has_parameters: bool,
-    /// Method of the scene.
-    method: Method,
 }
 
 impl Position {
     /// Starts with the constraints that were torn before the recording.
-    pub(crate) fn new(torn: Torn, method: Method) -> Self {
+    pub(crate) fn new(torn: Torn) -> Self {
         Self {
             keyframe_step: 0,
             latched_keyframe: None,
@@ -45,24 +41,21 @@ impl Position {
             rejected_count: 0,
             tears: TearTracker::new(torn),
             parameters: ParameterValues::default(),
-            has_parameters: false,
-            method,
         }
     }
 
     /// Starts at a state in the middle of a recording, with the newest keyframe up to its step.
-    pub(crate) fn at(state: &TapeState, keyframe: Option<(u64, Vec<u8>)>, method: Method) -> Self {
+    pub(crate) fn at(state: &TapeState, keyframe: Option<(u64, Vec<u8>)>) -> Self {
         let mut torn = state.torn.clone();
         torn.header.since_step = state.row.step.saturating_sub(state.row.scene_step);
-        let mut position = Self::new(Torn::default(), method);
-        position.tears = TearTracker::from_step(state.row.step, torn);
+        let mut position = Self::new(torn);
         position.outcome_count = state.row.outcome_count;
         position.rejected_count = state.status.as_ref().map_or(0, |row| row.rejected_count);
         position.latched_colliders.clone_from(&state.colliders);
         position.colliders.clone_from(&state.colliders);
         position.latched_status.clone_from(&state.status);
         if let Some(row) = &state.parameters {
-            position.apply_parameters(&Message::Parameters(row.clone()));
+            position.parameters.clone_from(&row.values);
         }
         if let Some((step, bytes)) = keyframe {
             position.apply(&Message::Keyframe { step, bytes: bytes.clone() });
@@ -91,47 +84,34 @@ impl Position {
 
     /// Applies a message to the parameters only. The load of a replay has those of its first snapshot.
     pub(crate) fn apply_parameters(&mut self, message: &Message) {
-        match message {
-            Message::Parameters(row) => {
-                self.parameters = row.values.clone();
-                self.has_parameters = true;
-            }
-            Message::Keyframe { bytes, .. } if !self.has_parameters => {
-                if let Ok(keyframe) = Keyframe::decode(bytes) {
-                    self.parameters = keyframe.parameter_values(self.method);
-                }
-            }
-            _ => {}
+        if let Message::Parameters(row) = message {
+            self.parameters.clone_from(&row.values);
         }
     }
 
-    /// Returns `true` if the torn constraints, colliders and parameters after a step are the same in both, as
+    /// Returns `true` if the torn constraints, colliders and parameters are the same in both, as
     /// far as they are known.
-    pub(super) fn agrees_with(&mut self, other: &mut Self, step: u64) -> bool {
+    pub(super) fn agrees_with(&self, other: &Self) -> bool {
         let are_same_colliders = match (&self.colliders, &other.colliders) {
             (Some(one), Some(two)) => one.states() == two.states(),
             _ => true,
         };
         are_same_colliders
             && self.parameters == other.parameters
-            && self.torn_indices(step) == other.torn_indices(step)
+            && self.torn_indices() == other.torn_indices()
     }
 
-    fn torn_indices(&mut self, step: u64) -> Option<BTreeSet<u32>> {
-        self.tears.at(step).map(|torn| torn.indices().collect())
+    fn torn_indices(&self) -> Option<BTreeSet<u32>> {
+        self.tears.torn().map(|torn| torn.indices().collect())
     }
 
     fn apply_outcome(&mut self, row: &OutcomeRow) {
         let is_applied = row.is_applied();
         self.outcome_count = row.index.saturating_add(1);
         self.rejected_count += u64::from(!is_applied);
-        // A keyframe of the same step precedes the outcome in the file and is more recent.
-        if !is_applied || row.step <= self.keyframe_step {
-            return;
-        }
         match row.action {
-            Action::Pause => self.is_paused = true,
-            Action::Resume => self.is_paused = false,
+            Action::Pause if is_applied => self.is_paused = true,
+            Action::Resume if is_applied => self.is_paused = false,
             _ => {}
         }
     }

@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::Context;
-use recorder::{
+use recording::{
     CollidersRow, ContentSelection, FileSource, Frame, FrameReader, LogEnd, LogReader, Message,
     RunDescription, StepRow, Tape, counted, open_recording, recorded_scene, torn_before_first,
 };
-use sim_contract::{BendState, Method, Stop};
+use sim_contract::{BendState, Stop};
 use sim_solver::Solver;
 
 use super::complete_state::keyframe_of;
@@ -67,7 +67,7 @@ impl Start {
         frame.updates = earlier.chain(own).collect();
         let mut reached = reached.clone();
         frame.updates.iter().for_each(|update| reached.apply(update));
-        reached.agrees_with(&mut begun, step).then_some(frame)
+        reached.agrees_with(&begun).then_some(frame)
     }
 }
 
@@ -76,7 +76,6 @@ impl Recording {
     pub(super) fn open(path: &Path, stop: &Stop) -> anyhow::Result<Self> {
         let file = Arc::new(open_recording(path)?);
         let log = LogReader::of_file(Arc::clone(&file), Some(stop))?;
-        log.selection().require(&ContentSelection::FOR_STATES, "`recorder play`")?;
         log.selection().require_all_particles("`recorder play`")?;
         // Names the problem of a file whose readable part has no snapshot.
         let mut frames = FrameReader::new(log);
@@ -136,7 +135,7 @@ impl Recording {
 
     fn find_needs(&self) -> anyhow::Result<Needs> {
         let solver = Solver::new(&recorded_scene(self.frames.log())?);
-        let bends = self.tape.bends();
+        let bends = self.tape.topology().bends();
         Ok(Needs {
             collider_count: self.collider_count.unwrap_or_else(|| solver.collider_count()),
             keyframe_size_bytes_max: solver.keyframe_size_bytes_max(),
@@ -155,7 +154,7 @@ impl Recording {
         self.tape.rewind(&mut self.frames);
         let frame = next_frame(&self.path, &mut self.frames)?;
         let torn = torn_before_first(self.tape.topology(), &frame);
-        let mut position = Position::new(torn, self.method());
+        let mut position = Position::new(torn);
         // The load has the parameters of its first snapshot.
         frame.updates.iter().for_each(|update| position.apply_parameters(update));
         self.last_row = Some(frame.row);
@@ -176,7 +175,7 @@ impl Recording {
             Some(bytes) => Some((step, bytes)),
             None => self.tape.keyframe_at(step)?,
         };
-        let position = Position::at(&state, keyframe, self.method());
+        let position = Position::at(&state, keyframe);
         self.tape.wind(&mut self.frames, step)?;
         self.last_row = Some(state.row);
         let frame = Frame {
@@ -208,10 +207,7 @@ impl Recording {
     }
 
     fn warn_of_gap(&mut self, last: &StepRow, row: &StepRow) {
-        // Older formats do not number their snapshots.
-        let indexes = last.snapshot_index.zip(row.snapshot_index);
-        let missing =
-            indexes.map_or(0, |(last, next)| self.selection().missing_between(last, next));
+        let missing = self.selection().missing_between(last.snapshot_index, row.snapshot_index);
         if missing == 0 {
             return;
         }
@@ -232,10 +228,6 @@ impl Recording {
     /// Returns the end of the file, once it was reached.
     pub(super) fn end(&self) -> Option<&LogEnd> {
         self.frames.end()
-    }
-
-    fn method(&self) -> Method {
-        Method::from_number(self.run().method).unwrap_or_default()
     }
 }
 

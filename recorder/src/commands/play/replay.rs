@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use anyhow::{Context, bail};
-use recorder::{
+use recording::{
     CollidersRow, ForcesRow, Frame, Message, RunDescription, StatusRow, SurfaceRow, TopologyRow,
 };
 use sim_contract::clock::monotonic_ns;
@@ -136,11 +136,11 @@ impl Replay {
 
     /// Publishes the latched messages before the first snapshot: the colliders, the torn constraints
     /// and the newest keyframe. A late subscriber of the node would have received them.
-    pub(crate) fn publish_latched(&mut self, step: u64) -> anyhow::Result<()> {
+    pub(crate) fn publish_latched(&mut self) -> anyhow::Result<()> {
         if let Some(row) = self.position.latched_colliders.take() {
             self.publish_colliders(&row)?;
         }
-        self.publish_tears(step.saturating_sub(1))?;
+        self.publish_tears()?;
         if let Some(bytes) = self.position.latched_keyframe.take() {
             self.publish_keyframe(self.position.keyframe_step, &bytes)?;
         }
@@ -163,7 +163,7 @@ impl Replay {
                 self.publish_colliders(row)?;
             }
         }
-        self.publish_tears(frame.row.step)?;
+        self.publish_tears()?;
         self.publish_parameters(frame.row.step)?;
         for update in &frame.updates {
             self.publish_update(update)?;
@@ -232,9 +232,9 @@ impl Replay {
         Ok(())
     }
 
-    /// Publishes the torn constraints at a step, if they have changed.
-    fn publish_tears(&mut self, step: u64) -> anyhow::Result<()> {
-        let Some(torn) = self.position.tears.at(step) else { return Ok(()) };
+    /// Publishes the torn constraints, if they have changed.
+    fn publish_tears(&mut self) -> anyhow::Result<()> {
+        let Some(torn) = self.position.tears.torn() else { return Ok(()) };
         if *torn == self.published_torn {
             return Ok(());
         }

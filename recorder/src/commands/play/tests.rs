@@ -4,15 +4,15 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
 
-use recorder::{
+use recording::{
     CollidersRow, Frame, Message, OutcomeRow, RunDescription, StepRow, SurfaceRow, TapeState,
     TearsRow, TopologyRow, Up,
 };
 use sim_contract::testing::TestDomain;
 use sim_contract::{
-    Action, CONTRACT_VERSION, Client, ColliderState, Command, ConstraintState, LoadHeader, Method,
-    Outcome, OutcomeStatus, Owner, ParticleState, Reason, SnapshotFlags, SnapshotHeader, Tap,
-    TearCause, Torn, TornConstraint, Triangle,
+    Action, CONTRACT_VERSION, Client, ColliderState, Command, ConstraintState, LoadHeader, Outcome,
+    OutcomeStatus, Owner, ParticleState, Reason, SnapshotFlags, SnapshotHeader, Tap, TearCause,
+    Torn, TornConstraint, Triangle,
 };
 
 use super::position::Position;
@@ -54,7 +54,7 @@ fn frame(step: u64, updates: Vec<Message>) -> Frame {
         outcome_count: 4,
         wake_late_ns: 6,
         solve_ns: 7,
-        snapshot_index: Some(40),
+        snapshot_index: 40,
         energy: None,
     };
     let particle = ParticleState { position: [-0.0, step as f32, 0.0], ..Default::default() };
@@ -62,7 +62,7 @@ fn frame(step: u64, updates: Vec<Message>) -> Frame {
 }
 
 fn replay(domain: &TestDomain) -> Replay {
-    replay_from(domain, Position::new(Torn::default(), Method::Xpbd))
+    replay_from(domain, Position::new(Torn::default()))
 }
 
 fn replay_from(domain: &TestDomain, position: Position) -> Replay {
@@ -193,9 +193,9 @@ fn readers_stay_connected_when_a_run_follows_another() {
     };
     let (run_id, step, torn) = next(&mut first);
     assert_eq!((step, torn), (12, vec![]));
-    let position = Position::new(before(None), Method::Xpbd);
+    let position = Position::new(before(None));
     let mut second = replay_after(&domain, Some(first.into_owner()), position);
-    second.publish_latched(3).unwrap();
+    second.publish_latched().unwrap();
     second.publish(&frame(3, vec![])).unwrap();
     let (second_run_id, step, _) = next(&mut second);
     assert_eq!(step, 3);
@@ -271,9 +271,9 @@ fn before(cause: Option<TearCause>) -> Torn {
 #[test]
 fn each_list_of_tears_is_complete_and_a_reset_empties_it() {
     let domain = TestDomain::new();
-    let position = Position::new(before(Some(TearCause::Force)), Method::Xpbd);
+    let position = Position::new(before(Some(TearCause::Force)));
     let mut replay = replay_from(&domain, position);
-    replay.publish_latched(5).unwrap();
+    replay.publish_latched().unwrap();
     let mut client = Client::attach(&domain.endpoint()).unwrap();
     assert_eq!(client.torn(Duration::ZERO).unwrap().constraints, []);
     serve(&mut replay);
@@ -283,9 +283,9 @@ fn each_list_of_tears_is_complete_and_a_reset_empties_it() {
     assert_eq!(torn(&mut client), (5, 2, vec![(2, force), (3, cut), (1, cut)]));
     replay.publish(&frame(7, vec![outcome(4, 7, Action::Reset)])).unwrap();
     assert_eq!(torn(&mut client), (7, 0, vec![]));
-    // A cut at the boundary of a reset precedes the reset in the file.
+    // Tears of the step of a reset follow the reset.
     replay.publish(&frame(8, vec![tears(8, &[0], "x")])).unwrap();
-    let updates = vec![tears(9, &[3], "cut"), outcome(5, 9, Action::Reset)];
+    let updates = vec![outcome(5, 9, Action::Reset), tears(9, &[3], "cut")];
     replay.publish(&frame(9, updates)).unwrap();
     assert_eq!(torn(&mut client), (9, 1, vec![(3, cut)]));
 }
@@ -307,8 +307,8 @@ fn a_replay_that_starts_late_publishes_the_torn_constraints_and_the_colliders() 
         parameters: None,
         status: None,
     };
-    let mut replay = replay_from(&domain, Position::at(&state, None, Method::Xpbd));
-    replay.publish_latched(6).unwrap();
+    let mut replay = replay_from(&domain, Position::at(&state, None));
+    replay.publish_latched().unwrap();
     let mut client = Client::attach(&domain.endpoint()).unwrap();
     let mut offset = |replay: &mut Replay, timeout| {
         let colliders = client.colliders(timeout).unwrap();

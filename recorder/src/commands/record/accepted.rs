@@ -1,6 +1,6 @@
 //! The part of the messages of a node that goes into the recording.
 
-use recorder::{Message, ParticleBuffer};
+use recording::{Message, ParticleBuffer};
 
 use super::load::RunHeader;
 use super::queue::Content;
@@ -37,7 +37,7 @@ impl Accepted {
     pub(crate) fn sort(&mut self) {
         self.contents.sort_by_key(|content| match content {
             Content::Update(message) => (message.step(), message.topic()),
-            Content::Snapshot(row, _) => (row.step, recorder::Topic::Steps),
+            Content::Snapshot(row, _) => (row.step, recording::Topic::Steps),
         });
     }
 }

@@ -44,7 +44,7 @@ const FLUSH_INTERVALS: RangeInclusive<Duration> =
     recorder record -o run.mcap --split-size 1GB --max-files 10 --min-free 5GB\n  \
     recorder record -o run.mcap --min-free 5GB\n  \
     recorder record -o incident.mcap --black-box 30s --max-files 10\n  \
-    recorder record -o run.mcap --every 10 --exclude status --meta operator=Ada\n  \
+    recorder record -o run.mcap --every 10 --meta operator=Ada\n  \
     recorder record -o flight.mcap --only-commands && recorder simulate flight.mcap -o run.mcap"
 )]
 #[allow(clippy::struct_excessive_bools, reason = "each is a flag of the command line")]
@@ -202,11 +202,6 @@ impl RecordArgs {
 
     /// Checks options that are useful only with others.
     pub(super) fn check(&self) -> Result<(), clap::Error> {
-        if let Some(topic) = self.selection.needed_topic() {
-            let name = topic.name();
-            let text = format!("--only-commands needs {name}: remove it from --exclude\n");
-            return Err(clap::Error::raw(ErrorKind::ArgumentConflict, text));
-        }
         if self.split.ring().files_max.is_none() || self.is_numbered() {
             return Ok(());
         }

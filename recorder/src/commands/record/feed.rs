@@ -6,7 +6,7 @@ pub(crate) mod trigger;
 
 use std::sync::Arc;
 
-use recorder::{AllCounts, Closing, ContentSelection, RunDescription, counted};
+use recording::{AllCounts, Closing, ContentSelection, RunDescription, counted};
 use sim_contract::clock::{SECOND_NS, monotonic_ns, realtime_ns};
 use sim_contract::{LostChanges, ReadError, State, StatusFlags};
 
@@ -15,7 +15,7 @@ use super::first_state::FirstState;
 use super::intake::{Intake, Skipped};
 use super::load::{LoadError, Now};
 use super::messages::Messages;
-use super::queue::{FileEnd, Item, Queue};
+use super::queue::{Content, FileEnd, Item, Queue};
 use super::split::{FileBegin, SplitArgs, WritePosition};
 use super::stop_reason::StopReason;
 use crate::cli::output;
@@ -153,9 +153,11 @@ impl Feed {
             self.is_paused = status.flags & StatusFlags::PAUSED != 0;
         }
         self.intake.accept_messages(messages, Now::read(), &mut self.accepted);
+        let is_snapshot = |content: &Content| content.snapshot_step().is_some();
+        let has_snapshot = self.accepted.contents.iter().any(is_snapshot);
         self.enqueue();
-        if self.is_paused && !was_paused {
-            // At the end of the file, it would have the time of what follows during the pause.
+        if self.is_paused && !(was_paused && has_snapshot) {
+            // What follows during the pause waits for no other snapshot.
             self.push_last_snapshot();
         }
         self.end_part_early();
@@ -194,6 +196,7 @@ impl Feed {
 
     /// Ends the file, if one has begun.
     pub(crate) fn end_file(&mut self, stop_reason: String) {
+        self.intake.accept_rest(&mut self.accepted);
         self.end_part(stop_reason, PartEnd::Last);
     }
 
@@ -215,6 +218,9 @@ impl Feed {
         };
         if end == FileEnd::Write {
             self.push_last_snapshot();
+        } else {
+            let queue = &self.queue;
+            self.selector.push_waiting(&mut |item| queue.push(item));
         }
         let mut closing = self.intake.end_file(stop_reason);
         closing.counts.set_left_out(&self.selector.take_counts());
@@ -253,22 +259,21 @@ impl Feed {
             self.warn_of_skipped();
             self.queue.begin(header, log_time_ns);
         }
+        self.intake.mark_written();
         let now_ns = monotonic_ns();
         for content in self.accepted.contents.drain(..) {
             if let Some(trigger) = &mut self.trigger {
                 trigger.watch(&content, now_ns);
             }
-            if let Some(item) = self.selector.select(Item { content, log_time_ns }) {
-                self.queue.push(item);
-            }
+            let queue = &self.queue;
+            self.selector.select(Item { content, log_time_ns }, &mut |item| queue.push(item));
         }
     }
 
     /// Records the last snapshot, if it was left out.
     fn push_last_snapshot(&mut self) {
-        if let Some(item) = self.selector.take_last_snapshot() {
-            self.queue.push(item);
-        }
+        let queue = &self.queue;
+        self.selector.push_last_snapshot(&mut |item| queue.push(item));
     }
 
     /// Begins the time of the recording with its first file, and reports the first step.

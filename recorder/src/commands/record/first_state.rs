@@ -1,6 +1,6 @@
 //! A copy of the state at which a recording can start.
 
-use recorder::EnergyRow;
+use recording::EnergyRow;
 use sim_contract::{Change, KeyframeHeader, ParticleState, SnapshotHeader, State, TearsHeader};
 
 /// A copy of a state, with the changes that a recording from this state on begins with.

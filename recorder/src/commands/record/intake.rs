@@ -2,7 +2,7 @@
 
 mod started;
 
-use recorder::{AllCounts, Closing, EnergyRow, Topic};
+use recording::{AllCounts, Closing, EnergyRow, Topic};
 use sim_contract::{
     Change, LostChanges, NodeStatus, Outcome, ReadError, SnapshotFlags, SnapshotHeader, State,
 };
@@ -159,7 +159,11 @@ impl Intake {
             self.status = messages.statuses.last().copied().or(self.status);
             return;
         };
-        started.accept_outcomes(self.outcomes.drain(..), accepted);
+        // Those of later steps follow with their states.
+        let next_step = started.last().step + 1;
+        let is_due = |one: &mut Outcome| one.run_id != started.run_id || one.step <= next_step;
+        let due: Vec<_> = self.outcomes.extract_if(.., is_due).collect();
+        started.accept_outcomes(due.into_iter(), accepted);
         started.accept_statuses(&messages.statuses, accepted);
     }
 
@@ -212,6 +216,18 @@ impl Intake {
         let statuses: Vec<_> =
             messages.statuses.extract_if(.., |one| is_earlier(one.run_id, one.step)).collect();
         started.accept_statuses(&statuses, accepted);
+    }
+
+    /// Marks all accepted snapshots as written.
+    pub(crate) fn mark_written(&mut self) {
+        self.started.iter_mut().for_each(Started::mark_written);
+    }
+
+    /// Accepts the outcomes of steps whose states do not follow in this file, at its end.
+    pub(crate) fn accept_rest(&mut self, accepted: &mut Accepted) {
+        if let Some(started) = &mut self.started {
+            started.accept_outcomes(self.outcomes.drain(..), accepted);
+        }
     }
 
     /// Ends a file. Returns its end, with the numbers of received and missing messages. The next state

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use recorder::{Message, RunDescription, SceneColliders, SurfaceRow, TopologyRow};
+use recording::{Message, RunDescription, SceneColliders, SurfaceRow, TopologyRow};
 use sim_contract::clock::{monotonic_ns, realtime_ns};
 use sim_contract::{LoadHeader, LoadedScene, SnapshotHeader};
 use sim_solver::{EnergyMeter, Scene, SceneError};

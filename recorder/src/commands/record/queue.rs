@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use recorder::{AllCounts, Backlog, Closing, Message, ParticleBuffer, StepRow, Topic};
+use recording::{AllCounts, Backlog, Closing, Message, ParticleBuffer, StepRow, Topic};
 use sim_contract::Action;
 
 use super::load::RunHeader;
@@ -253,9 +253,7 @@ impl State {
     fn add_to_backlog(&mut self, content: &Content) {
         let Some(backlog) = &mut self.backlog else { return };
         match content {
-            Content::Update(Message::Step(row)) | Content::Snapshot(row, _) => {
-                backlog.remove_to(row.step);
-            }
+            Content::Update(Message::Step(_)) | Content::Snapshot(..) => backlog.clear(),
             Content::Update(message) => {
                 // The start of a file always fits: the limit includes it.
                 let _fits = backlog.add(message);

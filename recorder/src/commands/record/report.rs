@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-use recorder::{AllCounts, Closing, Topic, counted};
+use recording::{AllCounts, Closing, Topic, counted};
 use serde::Serialize;
 
 use crate::cli::output;

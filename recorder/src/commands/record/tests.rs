@@ -4,7 +4,7 @@ use std::io::Write;
 use std::sync::{Condvar, Mutex};
 use std::thread;
 
-use recorder::{
+use recording::{
     AllCounts, Closing, Compression, FrameReader, GapCounter, LogEnd, LogOptions, LogReader,
     LogWriter, Message, OutcomeRow, RunDescription, StepRow, Topic, Up,
 };
@@ -84,7 +84,7 @@ fn description() -> RunDescription {
 }
 
 fn snapshot(index: u32) -> Content {
-    let row = StepRow { step: index.into(), snapshot_index: Some(index), ..StepRow::default() };
+    let row = StepRow { step: index.into(), snapshot_index: index, ..StepRow::default() };
     Content::Snapshot(row, vec![ParticleState::default(); 1000].as_slice().into())
 }
 

@@ -13,7 +13,7 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use anyhow::{Context, anyhow};
-use recorder::{
+use recording::{
     Closing, ContentSelection, LogOptions, LogWriter, Message, PartFile, ParticleBuffer, WriteError,
 };
 use sim_contract::clock::monotonic_ns;

@@ -5,8 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use anyhow::{Context, anyhow, bail};
-use recorder::simulation::{Job, Start, State};
-use recorder::{
+use recording::simulation::{Job, Start, State};
+use recording::{
     FrameReader, LogEnd, LogReader, Message, OutcomeRow, TimedCommand, parse_commands,
     scene_to_simulate, sort_commands,
 };
@@ -109,7 +109,7 @@ impl Survey {
 
     pub(super) fn read(path: &Path, stop: &Stop) -> anyhow::Result<Self> {
         let log = LogReader::open_until(path, stop)?;
-        let mut survey = Self::new(scene_to_simulate(&log, "`recorder simulate`")?);
+        let mut survey = Self::new(scene_to_simulate(&log)?);
         let mut frames = FrameReader::new(log);
         while let Some(frame) = frames.next_frame()? {
             let step = frame.row.step;
@@ -252,7 +252,7 @@ fn restore<R: std::io::Read>(
 fn state_at<R: std::io::Read>(
     frames: &mut FrameReader<R>,
     step: u64,
-) -> anyhow::Result<Option<(State, recorder::StepRow)>> {
+) -> anyhow::Result<Option<(State, recording::StepRow)>> {
     while let Some(frame) = frames.next_frame()? {
         if frame.row.step < step {
             continue;
@@ -305,13 +305,13 @@ fn check_last_step(commands: &[TimedCommand], last_step: u64) -> anyhow::Result<
 /// The states that commands of the recording put in place: those of other processes, and those of steps
 /// before the start.
 pub(super) struct GivenStates {
-    frames: FrameReader<recorder::FileSource>,
+    frames: FrameReader<recording::FileSource>,
     /// The applied commands with a state, by index.
     applied: BTreeMap<u64, OutcomeRow>,
 }
 
 impl GivenStates {
-    fn new(frames: FrameReader<recorder::FileSource>, outcomes: &[OutcomeRow]) -> Self {
+    fn new(frames: FrameReader<recording::FileSource>, outcomes: &[OutcomeRow]) -> Self {
         let given = outcomes.iter().filter(|row| row.puts_state_in_place() && row.is_applied());
         Self { frames, applied: given.map(|row| (row.index, row.clone())).collect() }
     }

@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context, bail};
-use recorder::verification::{Resimulation, SnapshotFinding};
-use recorder::{
-    Closing, Frame, FrameReader, LogEnd, LogOptions, LogReader, LogWriter, Message, ReadError,
-    SceneColliders, Topic, WriteError, scene_to_simulate,
+use recording::verification::{Resimulation, SnapshotFinding};
+use recording::{
+    Closing, ContentSelection, Frame, FrameReader, LogEnd, LogOptions, LogReader, LogWriter,
+    Message, ReadError, SceneColliders, Topic, WriteError, scene_to_simulate,
 };
 use sim_solver::Scene;
 
@@ -46,7 +46,7 @@ pub(super) struct Completion<R: Read> {
 impl<R: Read> Completion<R> {
     /// Starts with a recording that has its commands and keyframes.
     pub(super) fn new(path: &Path, log: LogReader<R>, threads: usize) -> anyhow::Result<Self> {
-        let scene = scene_to_simulate(&log, "`recorder simulate`")?;
+        let scene = scene_to_simulate(&log)?;
         Ok(Self {
             path: path.to_owned(),
             frames: FrameReader::new(log),
@@ -117,7 +117,8 @@ impl<R: Read> Completion<R> {
         log_time_ns: u64,
     ) -> Result<LogWriter<W>, WriteError> {
         let log = self.frames.log();
-        let options = LogOptions { selection: log.selection().with_all_particles(), ..options };
+        let selection = ContentSelection { is_only_commands: false, ..log.selection() };
+        let options = LogOptions { selection, ..options };
         let mut out = LogWriter::create(out, options, log.run(), log.scene(), log_time_ns)?;
         out.describe_colliders(&SceneColliders::new(&self.scene))?;
         Ok(out)
@@ -191,7 +192,7 @@ impl<R: Read> Completion<R> {
         };
         let stop_reason = stop_reason.to_owned();
         let mut closing = Closing { stop_reason, ..recorded.cloned().unwrap_or_default() };
-        let is_completed = self.frames.log().selection().is_only_commands();
+        let is_completed = self.frames.log().selection().is_only_commands;
         closing.counts.set_written(&written);
         if is_completed {
             closing.counts[Topic::Particles].left_out = 0;

@@ -3,8 +3,8 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::{DQuat, DVec3};
-use recorder::pictures::{Extent, ExtentTracker};
-use recorder::{SceneState, ShapeRow};
+use recording::pictures::{Extent, ExtentTracker};
+use recording::{SceneState, ShapeRow};
 use sim_contract::PlainF32;
 
 use crate::export::snapshots::Snapshots;

@@ -3,7 +3,7 @@
 use std::io::Write;
 
 use anyhow::Context;
-use recorder::EnergyRow;
+use recording::EnergyRow;
 use sim_solver::EnergyMeter;
 
 use crate::export::snapshots::Snapshots;

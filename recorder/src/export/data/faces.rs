@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use recorder::SceneState;
+use recording::SceneState;
 use sim_contract::Triangle;
 use sim_solver::Scene;
 use sim_solver::scene::{NameRun, Obj, Shape};

@@ -2,7 +2,7 @@
 
 use std::io::Write;
 
-use recorder::{
+use recording::{
     AllCounts, DrawnMesh, GapCounter, LogReader, SCENE_TOPIC, SceneDrawing, SceneState,
     scene_format,
 };

@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use std::io::Write;
 
 use anyhow::bail;
-use recorder::{ForcesRow, OutcomeRow, SceneState, counted};
+use recording::{ForcesRow, OutcomeRow, SceneState, counted};
 use sim_contract::{ParticleState, PlainF32};
 use zip::write::{SimpleFileOptions, StreamWriter};
 use zip::{DateTime, ZipWriter};

@@ -10,7 +10,7 @@ use super::written_files::WrittenFiles;
 use crate::export::frame_names::FrameNames;
 use crate::export::frames::Frame;
 use crate::export::snapshots::Snapshots;
-use recorder::SceneState;
+use recording::SceneState;
 
 /// Writes a file per frame into `folder`.
 pub(crate) fn write(

@@ -8,7 +8,7 @@ use mcap::records::{MessageHeader, Metadata, Record};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::write::NoSeek;
 use mcap::{Attachment, WriteOptions, Writer};
-use recorder::{AllCounts, CLOSING_METADATA, Closing, Topic, TopicFormat};
+use recording::{AllCounts, CLOSING_METADATA, Closing, Topic, TopicFormat};
 
 /// The copy of a recording, up to the record that was copied last.
 pub(super) struct RecordingCopy<'a> {
@@ -119,7 +119,7 @@ impl<'a> RecordingCopy<'a> {
             Record::Channel(channel) => {
                 let mcap::records::Channel { id, schema_id, topic, message_encoding, metadata } =
                     channel;
-                if topic == recorder::SCENE_TOPIC {
+                if topic == recording::SCENE_TOPIC {
                     bail!("has /scene already; export the recording that it is a copy of");
                 }
                 if topic == Topic::Particles.name() {

@@ -11,7 +11,7 @@ use std::path::Path;
 use mcap::records::MessageHeader;
 use mcap::write::NoSeek;
 use mcap::{WriteOptions, Writer};
-use recorder::{MAP_FRAME, WORLD_FRAME, map_from_world};
+use recording::{MAP_FRAME, WORLD_FRAME, map_from_world};
 use sim_contract::ParticleState;
 
 use super::written_files::WrittenFiles;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use recorder::SceneState;
+use recording::SceneState;
 use sim_contract::ParticleState;
 
 use super::colliders::Colliders;

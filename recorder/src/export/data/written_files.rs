@@ -5,7 +5,7 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow};
-use recorder::{Existing, PartFile};
+use recording::{Existing, PartFile};
 use sim_contract::{console, explain_write_error};
 
 /// A file that keeps the first error of writing, which a format may wrap or take for one of its input.

@@ -4,7 +4,7 @@ use std::io::Write;
 use std::time::Duration;
 
 use anyhow::{Context, bail};
-use recorder::pictures::{Picture, Size, rasterize};
+use recording::pictures::{Picture, Size, rasterize};
 
 /// Most frames of an animation. A higher number is probably a mistake.
 const FRAMES_MAX: usize = 10_000;

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use recorder::pictures::{Picture, encode_png, encode_svg};
-use recorder::{Existing, PartFile};
+use recording::pictures::{Picture, encode_png, encode_svg};
+use recording::{Existing, PartFile};
 
 use crate::export::frame_names::FrameNames;
 

@@ -38,10 +38,11 @@ def verify(
     stop: int | None = None,
     threads: int = 1,
 ) -> Verification:
-    """Simulates a recording again and compares every bit, up to the first difference.
+    """Simulates a recording again and compares every state, up to the first difference.
 
     `start` is the first step to compare, and `stop` the step after the last one. The simulation starts at the
-    last complete state up to `start`. Other threads of the interpreter run meanwhile; Ctrl-C ends it.
+    last complete state up to `start`. `threads` parts of the recording are simulated at the same time. Other threads of
+    the interpreter run meanwhile; Ctrl-C ends it.
 
     Raises `RecordingError` if the file cannot be read, or has no complete state to start from.
     """
@@ -612,7 +613,7 @@ class Recording:
     def topology(self) -> Topology:
         """Returns the constraints."""
     def bends(self) -> Bends:
-        """Returns the bends. A recording of format 5 or earlier does not list them."""
+        """Returns the bends."""
     def surface(self) -> Wholes:
         """Returns the particles of each triangle of the surface. Shape: (triangles, 3)."""
     def at_or_before(self, step: int) -> Snapshot:

@@ -2,7 +2,7 @@
 
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
-use recorder::ForcesRow;
+use recording::ForcesRow;
 use sim_contract::PlainF32;
 
 use crate::convert::rows;

@@ -1,7 +1,7 @@
 //! Outcomes of commands.
 
 use pyo3::prelude::*;
-use recorder::OutcomeRow;
+use recording::OutcomeRow;
 use sim_contract::{Action, Reason};
 
 use crate::convert::from_json;

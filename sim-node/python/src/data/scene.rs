@@ -4,7 +4,7 @@ use std::path::Path;
 
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
-use recorder::LogReader;
+use recording::LogReader;
 use sim_contract::{BendState, ConstraintState, LoadHeader, Method, Triangle, read_scene_file};
 use sim_solver::{Scene, SceneError, builtin};
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use recorder::ForcesRow;
+use recording::ForcesRow;
 use sim_contract::{ParticleState, SnapshotFlags, SnapshotHeader};
 
 use crate::convert::{hash, hash_hex};

@@ -29,7 +29,7 @@ impl State {
     ) -> PyResult<Self> {
         let decoded = Keyframe::decode(&keyframe);
         let decoded = decoded.map_err(|error| StateError::new_err(error.to_string()))?;
-        let hash = recorder::state_hash(&particles, decoded.torn());
+        let hash = recording::state_hash(&particles, decoded.torn());
         Ok(Self { scene_hash, particles, keyframe, hash })
     }
 

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::process::Command;
 
 use integration_tests::{DEADLINE, Finished, Process, Program, Sandbox, Signal, wait_for};
-use recorder::{LogReader, Message};
+use recording::{LogReader, Message};
 use sim_contract::{Action, Client};
 
 /// Kills at different moments.

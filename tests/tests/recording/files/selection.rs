@@ -110,7 +110,7 @@ fn a_file_without_its_end_does_not_take_what_is_left_out_for_lost() {
     let sandbox = Sandbox::new();
     let file = sandbox.path("run.mcap");
     let _node = Process::start_ready(Program::SimNode, &sandbox, &["run", "rope", "--paused"]);
-    let args = ["-o", &file, "--every", "5", "--exclude", "outcomes", "--flush-interval", "100ms"];
+    let args = ["-o", &file, "--every", "5", "--flush-interval", "100ms"];
     let recording = record(&sandbox, &args);
     ctl(&sandbox, &["step", "20"]);
     ctl(&sandbox, &["pin", "3"]);
@@ -123,38 +123,4 @@ fn a_file_without_its_end_does_not_take_what_is_left_out_for_lost() {
     let info: Value = serde_json::from_str(&info.stdout).unwrap();
     assert_eq!((&info["lost"], &info["file_end"].is_string()), (&json!({}), &true), "{info}");
     assert!(steps(&part).len() < 20);
-}
-
-#[test]
-fn programs_name_the_topics_that_a_recording_leaves_out() {
-    let sandbox = Sandbox::new();
-    let (file, pictures) = (sandbox.path("run.mcap"), sandbox.path("pictures"));
-    record_steps(&sandbox, &["-o", &file, "--topics", "status,/outcomes"]);
-    let info = recorder(&sandbox, &["info", "--json", &file]).json();
-    assert_eq!((&info["lost"], &info["messages"]["/particles"]), (&json!({}), &json!(0)), "{info}");
-    assert_eq!(info["messages"]["/steps"], 201, "{info}");
-    for args in [&["verify", &file][..], &["play", &file], &["export", &file, "--png", &pictures]] {
-        let refused = recorder(&sandbox, args);
-        assert_eq!(refused.code, Some(1), "{refused:?}");
-        for words in [&file, "leaves out ", "/particles", " on purpose", args[0]] {
-            assert!(refused.stderr.contains(words), "no \"{words}\" in: {}", refused.stderr);
-        }
-    }
-    assert!(!Path::new(&pictures).exists());
-    // Without the status and the events of the node, everything else works.
-    let other = sandbox.path("other.mcap");
-    record_steps(&sandbox, &["-o", &other, "--exclude", "status,events"]);
-    let verified = recorder(&sandbox, &["verify", "--json", &other]).json();
-    assert_eq!(verified["verdict"], "identical", "{verified}");
-    let not_covered = verified["not_covered"].as_array().unwrap();
-    assert!(not_covered.contains(&json!("/events, which the recording leaves out")), "{verified}");
-    for (option, value, words) in [
-        ("--exclude", "steps", "every reader needs it"),
-        ("--topics", "partikles", "it must be topics of a recording: tf, topology"),
-        ("--every", "0", "it must be a whole number from 1 to 1000000"),
-    ] {
-        let refused = recorder(&sandbox, &["record", option, value]);
-        assert_eq!(refused.code, Some(2), "{refused:?}");
-        assert!(refused.stderr.contains(words), "no \"{words}\" in: {}", refused.stderr);
-    }
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use integration_tests::{DEADLINE, Process, Program, Sandbox, ctl, wait_for};
-use recorder::{FrameReader, LogReader, Message};
+use recording::{FrameReader, LogReader, Message};
 use sim_contract::{Action, Change, Client, ColliderState, ParameterValues, Tap};
 
 use crate::recording::files::steps;

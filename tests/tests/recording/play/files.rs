@@ -6,7 +6,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use integration_tests::{DEADLINE, Process, Program, Sandbox, ctl, wait_for};
-use recorder::{Closing, FrameReader, LogOptions, LogReader, LogWriter, Message};
+use recording::{Closing, FrameReader, LogOptions, LogReader, LogWriter, Message};
 use sim_contract::{Client, Tap};
 
 /// Steps of each file of a split recording.

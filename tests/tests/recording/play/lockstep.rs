@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use integration_tests::{Process, Program, Sandbox, ctl};
-use recorder::{Frame, FrameReader, LogReader, Message};
+use recording::{Frame, FrameReader, LogReader, Message};
 
 const STEPS: u64 = 1500;
 

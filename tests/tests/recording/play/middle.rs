@@ -5,7 +5,7 @@ use std::fs::File;
 use std::path::Path;
 
 use integration_tests::{Finished, Process, Program, Sandbox, ctl, wait_for};
-use recorder::{Closing, FrameReader, LogOptions, LogReader, LogWriter, RunDescription};
+use recording::{Closing, FrameReader, LogOptions, LogReader, LogWriter, RunDescription};
 use serde_json::{Value, json};
 
 /// The keyframes of the recording are those of each second, of 240 steps, and of each command.

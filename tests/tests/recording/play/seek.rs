@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use integration_tests::{DEADLINE, Finished, Process, Program, Sandbox, ctl, wait_for};
-use recorder::{Frame, FrameReader, LogReader, Message};
+use recording::{Frame, FrameReader, LogReader, Message};
 use sim_contract::{Client, ParameterValues, Tap};
 
 /// Commands of every kind that changes more than particles.

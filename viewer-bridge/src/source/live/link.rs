@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use recorder::{StatusRow, StepRow};
+use recording::{StatusRow, StepRow};
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{
     AttachError, Client, Endpoint, NodeStatus, ParameterValues, SnapshotFlags, Tap,

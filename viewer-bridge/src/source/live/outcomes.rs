@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use recorder::OutcomeRow;
+use recording::OutcomeRow;
 use sim_contract::{Action, Client, Outcome};
 
 use super::carrier::Carrier;

@@ -4,7 +4,7 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Sender;
 
-use recorder::{
+use recording::{
     IndexedLog, LogEnd, LoggedMessage, Message, OutcomeRow, ReadError, StepRow, TearTracker,
     state_hash,
 };
@@ -125,7 +125,7 @@ impl Check {
 
     fn compare(&mut self, step: u64, particles: &[ParticleState]) {
         let row = self.row.take().filter(|row| row.step == step);
-        let torn: Option<Vec<u32>> = self.torn.at(step).map(|torn| torn.indices().collect());
+        let torn: Option<Vec<u32>> = self.torn.torn().map(|torn| torn.indices().collect());
         let torn = torn.as_deref().zip(row);
         let torn = torn.and_then(|(torn, row)| torn.get(..row.torn_count as usize));
         match (row, torn) {

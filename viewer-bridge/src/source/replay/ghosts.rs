@@ -12,8 +12,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::{self, JoinHandle};
 
-use recorder::verification::distance;
-use recorder::{ReadError, Tape, TapeError, TapeState};
+use recording::verification::distance;
+use recording::{ReadError, Tape, TapeError, TapeState};
 use sim_contract::{ConstraintState, ParticleState, Stop};
 
 use super::open::Recording;
@@ -263,7 +263,7 @@ fn hidden(ghost: &TapeState, constraints: &[ConstraintState]) -> Vec<u32> {
 
 #[cfg(test)]
 mod tests {
-    use recorder::StepRow;
+    use recording::StepRow;
 
     use super::*;
 

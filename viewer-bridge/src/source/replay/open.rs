@@ -5,7 +5,7 @@ use std::io::ErrorKind;
 use std::path::Path;
 
 use anyhow::{Context, anyhow, bail};
-use recorder::{LogEnd, ReadError, Tape, TapeError, TapeState};
+use recording::{LogEnd, ReadError, Tape, TapeError, TapeState};
 use sim_contract::Stop;
 
 use crate::scene::load::Load;
@@ -112,8 +112,8 @@ fn load_of(tape: &Tape) -> anyhow::Result<Load> {
     let constraints = topology.constraints();
     let constraints =
         constraints.with_context(|| malformed("the columns of /topology differ in length"))?;
-    let bends = tape.bends();
-    let bends = bends
+    let bends = topology
+        .bends()
         .with_context(|| malformed("the columns of the bends in /topology differ in length"))?;
     let triangles = surface.triangles();
     let triangles = triangles.with_context(|| malformed("/surface ends within a triangle"))?;

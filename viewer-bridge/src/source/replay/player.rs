@@ -3,7 +3,7 @@
 use std::sync::mpsc::Receiver;
 use std::time::Duration;
 
-use recorder::{ReadError, TapeError, TapeState};
+use recording::{ReadError, TapeError, TapeState};
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{Forces, ForcesHeader, ParameterValues, Reason};
 

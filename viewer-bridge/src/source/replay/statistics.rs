@@ -1,7 +1,7 @@
 //! Statistics of a recording: those of the node at the time of the recording, and the stretch and energy
 //! of the state on show.
 
-use recorder::{StatusRow, TapeState};
+use recording::{StatusRow, TapeState};
 use sim_contract::ParticleFlags;
 
 use super::open::Recording;

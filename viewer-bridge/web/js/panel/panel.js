@@ -116,7 +116,7 @@ export class Panel {
   doubt() {
     const { parameters } = this.simulation;
     if (parameters?.values == null || parameters.is_complete) return "";
-    return "It has an older format without parameters: these are the values of its scene.";
+    return "Its parameters cannot be read: these are the values of its scene.";
   }
 
   /** Sends the parameters that changed since the last animation frame. */

@@ -5,7 +5,7 @@ use std::io::Cursor;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use recorder::{AnchorForceRow, ForcesRow, FrameReader, OutcomeRow};
+use recording::{AnchorForceRow, ContentSelection, ForcesRow, FrameReader, OutcomeRow};
 use sim_contract::{Action, Command, Outcome, PlainF32, RestoreContents};
 use sim_solver::scene::{Mesh, Shape};
 use zip::ZipArchive;
@@ -432,7 +432,7 @@ fn velocities_and_colliders_are_interpolated_as_positions_are() {
 fn with_messages(file: &[u8], further: impl Fn(u64) -> Option<Message>) -> Vec<u8> {
     let mut log = LogReader::new(file).unwrap();
     let (run, scene) = (log.run().clone(), log.scene().to_vec());
-    let selection = ContentSelection::default().with_forces();
+    let selection = ContentSelection { has_forces: true, ..ContentSelection::default() };
     let options = LogOptions { selection, ..LogOptions::default() };
     let mut copy = LogWriter::create(Vec::new(), options, &run, &scene, 0).unwrap();
     while let Some(logged) = log.next_message().unwrap() {
@@ -544,7 +544,7 @@ fn a_copy_for_viewers_is_a_recording_with_the_same_content() {
         let copy = written(intact, foxglove::write);
         assert_eq!(recorded(&copy), recorded(original));
         if original.len() < file.len() {
-            let checked = recorder::check_file(Cursor::new(&copy), None, &mut |_, _| {}).unwrap();
+            let checked = recording::check_file(Cursor::new(&copy), None, &mut |_, _| {}).unwrap();
             assert_eq!(checked.findings.list(), [], "it declares that it had no end");
         }
         let read = survey_of(&copy, "a");
@@ -579,7 +579,7 @@ fn a_copy_of_a_damaged_recording_has_what_is_intact_and_declares_the_rest() {
         "{} of {snapshot_count}",
         recorded(&copy).len()
     );
-    let checked = recorder::check_file(Cursor::new(&copy), None, &mut |_, _| {}).unwrap();
+    let checked = recording::check_file(Cursor::new(&copy), None, &mut |_, _| {}).unwrap();
     assert_eq!(checked.findings.list(), []);
     let closing = |file: &[u8]| {
         let mut log = LogReader::new(file).unwrap();

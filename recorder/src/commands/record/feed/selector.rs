@@ -1,25 +1,15 @@
-//! The topics and snapshots that a recording holds, and the count of those that it leaves out.
+//! The snapshots that a recording holds, and the count of those that it leaves out.
 
 use std::num::NonZeroU32;
 
-use recorder::{AllCounts, ContentSelection, Message, ParticleBuffer, StepRow, Topic};
-use sim_cli::did_you_mean;
+use recording::{AllCounts, ContentSelection, Message, ParticleBuffer, StepRow, Topic};
 
 use crate::cli::parse::whole_number_in;
 use crate::commands::record::queue::{Content, Item};
 
-/// Options that leave out a part of a run.
+/// Options that say which part of a run is recorded.
 #[derive(Debug, Clone, clap::Args)]
 pub(crate) struct SelectionArgs {
-    /// Record only these topics, such as particles,keyframe,status. The constraints, the triangles, and
-    /// the headers of snapshots (/steps) are always recorded
-    #[arg(long, value_name = "LIST", value_delimiter = ',', conflicts_with = "exclude",
-        value_parser = topic)]
-    topics: Vec<Topic>,
-    /// Leave these topics out, such as status,events. Files declare it, and programs that need a
-    /// topic name it
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = optional_topic)]
-    exclude: Vec<Topic>,
     /// Record every N-th snapshot, those with a keyframe, and the last one of each file and before each
     /// pause. Commands and tears between them are recorded, so the file can still be verified
     #[arg(long, value_name = "N", default_value = "1", allow_hyphen_values = true,
@@ -27,7 +17,7 @@ pub(crate) struct SelectionArgs {
     every: NonZeroU32,
     /// Record the commands, and the particles of the first step and then about every ten seconds.
     /// `recorder simulate` computes the others, bit for bit
-    #[arg(long, conflicts_with_all = ["topics", "every"])]
+    #[arg(long, conflicts_with = "every")]
     only_commands: bool,
     /// Record the forces on colliders, anchors and fixed particles in each step, too (/forces). The node
     /// computes them only while a program reads them
@@ -40,55 +30,15 @@ pub(crate) struct SelectionArgs {
 
 impl Default for SelectionArgs {
     fn default() -> Self {
-        let (topics, exclude) = (Vec::new(), Vec::new());
-        let every = NonZeroU32::MIN;
-        Self { topics, exclude, every, only_commands: false, forces: false, energy: false }
+        Self { every: NonZeroU32::MIN, only_commands: false, forces: false, energy: false }
     }
 }
 
 impl SelectionArgs {
     pub(crate) fn selection(&self) -> ContentSelection {
-        let is_left_out = |topic: &Topic| {
-            self.exclude.contains(topic) || !self.topics.is_empty() && !self.topics.contains(topic)
-        };
-        let left_out: Vec<_> = ContentSelection::OPTIONAL.into_iter().filter(is_left_out).collect();
-        let selection = ContentSelection::new(self.every, &left_out);
-        let selection = if self.only_commands { selection.with_only_commands() } else { selection };
-        let selection = if self.energy { selection.with_energy() } else { selection };
-        if self.forces || self.topics.contains(&Topic::Forces) {
-            selection.with_forces()
-        } else {
-            selection
-        }
+        let Self { every, only_commands: is_only_commands, forces, energy } = *self;
+        ContentSelection { every, is_only_commands, has_forces: forces, has_energy: energy }
     }
-
-    /// Returns a topic that is left out although the commands are useless without it.
-    pub(crate) fn needed_topic(&self) -> Option<Topic> {
-        let is_left_out = |topic: &Topic| self.exclude.contains(topic);
-        let is_used = |_: &Topic| self.only_commands;
-        ContentSelection::FOR_STATES.into_iter().find(is_left_out).filter(is_used)
-    }
-}
-
-fn topic(text: &str) -> Result<Topic, String> {
-    let name = format!("/{}", text.trim().trim_start_matches('/'));
-    Topic::from_name(&name).ok_or_else(|| {
-        let names = Topic::ALL.map(|topic| &topic.name()[1..]);
-        let guess = did_you_mean(&name[1..], names);
-        format!("it must be topics of a recording: {}{guess}", names.join(", "))
-    })
-}
-
-fn optional_topic(text: &str) -> Result<Topic, String> {
-    let topic = topic(text)?;
-    if ContentSelection::OPTIONAL.contains(&topic) {
-        return Ok(topic);
-    }
-    if topic == Topic::Forces {
-        return Err("only a recording with --forces has it".to_owned());
-    }
-    let names: Vec<_> = ContentSelection::OPTIONAL.map(|topic| &topic.name()[1..]).into();
-    Err(format!("every reader needs it (allowed: {})", names.join(", ")))
 }
 
 fn period(text: &str) -> Result<NonZeroU32, String> {
@@ -112,6 +62,8 @@ pub(super) struct Selector {
     in_place_step: Option<u64>,
     /// The newest snapshot with the time of its reception, if it was left out.
     last_left_out: Option<(StepRow, ParticleBuffer, u64)>,
+    /// The messages of later steps, until it is known whether that snapshot is recorded before them.
+    waiting: Vec<Item>,
     /// Only `left_out` is set.
     counts: AllCounts,
 }
@@ -124,18 +76,14 @@ impl Selector {
             keyframes_since_state: None,
             in_place_step: None,
             last_left_out: None,
+            waiting: Vec::new(),
             counts: AllCounts::default(),
         }
     }
 
-    /// Returns the part of an item that is recorded.
-    pub(super) fn select(&mut self, item: Item) -> Option<Item> {
+    /// Passes on the part of an item that is recorded.
+    pub(super) fn select(&mut self, item: Item, push: &mut impl FnMut(Item)) {
         let Item { content, log_time_ns } = item;
-        let content = self.selected_part(content, log_time_ns)?;
-        Some(Item { content, log_time_ns })
-    }
-
-    fn selected_part(&mut self, content: Content, log_time_ns: u64) -> Option<Content> {
         match content {
             Content::Update(message) => {
                 match &message {
@@ -145,28 +93,36 @@ impl Selector {
                     }
                     _ => {}
                 }
-                self.has(message.topic()).then_some(Content::Update(message))
+                let item = Item { content: Content::Update(message), log_time_ns };
+                if self.last_left_out.is_some() { self.waiting.push(item) } else { push(item) }
             }
             Content::Snapshot(row, particles) => {
-                let is_due = row.snapshot_index.is_none_or(|one| self.selection.has_snapshot(one));
-                let has_keyframe = self.keyframe_step == Some(row.step);
-                if !is_due && !has_keyframe {
+                self.push_waiting(push);
+                let is_due = self.selection.has_snapshot(row.snapshot_index);
+                if is_due || self.keyframe_step == Some(row.step) {
+                    push(Item { content: self.recorded_part(row, particles), log_time_ns });
+                } else {
                     self.count_snapshots(|left_out| left_out + 1);
                     self.last_left_out = Some((row, particles, log_time_ns));
-                    return None;
                 }
-                self.last_left_out = None;
-                Some(self.recorded_part(row, particles))
             }
         }
     }
 
-    /// Returns what is recorded of the newest snapshot at the end of a file, if it was left out: a file ends
-    /// where the recording did, not up to a period before. Messages of the next step may precede it in the file.
-    pub(super) fn take_last_snapshot(&mut self) -> Option<Item> {
-        let (row, particles, log_time_ns) = self.last_left_out.take()?;
-        self.count_snapshots(|left_out| left_out - 1);
-        Some(Item { content: self.recorded_part(row, particles), log_time_ns })
+    /// Passes on what is recorded of the newest snapshot before a pause or at the end of a file, if it was left out: a
+    /// file ends where the recording did, not up to a period before.
+    pub(super) fn push_last_snapshot(&mut self, push: &mut impl FnMut(Item)) {
+        if let Some((row, particles, log_time_ns)) = self.last_left_out.take() {
+            self.count_snapshots(|left_out| left_out - 1);
+            push(Item { content: self.recorded_part(row, particles), log_time_ns });
+        }
+        self.push_waiting(push);
+    }
+
+    /// Passes on the messages that wait. The snapshot before them stays left out.
+    pub(super) fn push_waiting(&mut self, push: &mut impl FnMut(Item)) {
+        self.last_left_out = None;
+        self.waiting.drain(..).for_each(push);
     }
 
     fn count_snapshots(&mut self, count: impl Fn(u64) -> u64) {
@@ -177,13 +133,11 @@ impl Selector {
 
     /// Returns what is recorded of a snapshot: all of it, or its header.
     fn recorded_part(&mut self, row: StepRow, particles: ParticleBuffer) -> Content {
-        if self.selection.is_only_commands() && !self.is_state(row.step) {
+        if self.selection.is_only_commands && !self.is_state(row.step) {
             self.counts[Topic::Particles].left_out += 1;
             Content::Update(Message::Step(row))
-        } else if self.has(Topic::Particles) {
-            Content::Snapshot(row, particles)
         } else {
-            Content::Update(Message::Step(row))
+            Content::Snapshot(row, particles)
         }
     }
 
@@ -199,31 +153,23 @@ impl Selector {
         is_state
     }
 
-    /// Returns `true` for a selected topic, and counts a message of any other.
-    fn has(&mut self, topic: Topic) -> bool {
-        let has_topic = self.selection.has_topic(topic);
-        self.counts[topic].left_out += u64::from(!has_topic);
-        has_topic
-    }
-
     /// Returns the counts of a file, and begins with those of the next one.
     pub(super) fn take_counts(&mut self) -> AllCounts {
         self.keyframes_since_state = None;
-        self.last_left_out = None;
         std::mem::take(&mut self.counts)
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use recorder::{OutcomeRow, ParticleBuffer, StepRow};
+    use recording::{OutcomeRow, ParticleBuffer, StepRow};
     use sim_contract::{Action, Command, Outcome, Reason};
 
     use super::*;
 
     fn snapshot(index: u32) -> Content {
         let step = u64::from(index);
-        let row = StepRow { step, snapshot_index: Some(index), ..StepRow::default() };
+        let row = StepRow { step, snapshot_index: index, ..StepRow::default() };
         Content::Snapshot(row, ParticleBuffer::default())
     }
 
@@ -231,63 +177,80 @@ mod tests {
         Content::Update(Message::Keyframe { step, bytes: Vec::new() })
     }
 
-    /// Selects a content that arrives when its step ends.
-    fn select(selector: &mut Selector, content: Content) -> Option<Content> {
+    fn every_fourth() -> ContentSelection {
+        ContentSelection { every: NonZeroU32::new(4).unwrap(), ..ContentSelection::default() }
+    }
+
+    /// Returns what a content that arrives when its step ends passes on.
+    fn select(selector: &mut Selector, content: Content) -> Vec<Content> {
         let log_time_ns = match &content {
             Content::Snapshot(row, _) => row.step,
             Content::Update(message) => message.step(),
         };
-        selector.select(Item { content, log_time_ns }).map(|item| item.content)
+        let mut passed = Vec::new();
+        selector.select(Item { content, log_time_ns }, &mut |item| passed.push(item.content));
+        passed
     }
 
-    /// Step of a snapshot, which was received when the step ended.
-    fn step_of(item: Option<Item>) -> Option<u64> {
-        let Item { content, log_time_ns } = item?;
-        let step = content.snapshot_step().unwrap();
-        assert_eq!(log_time_ns, step);
-        Some(step)
+    fn last_steps(selector: &mut Selector) -> Vec<u64> {
+        let mut steps = Vec::new();
+        selector.push_last_snapshot(&mut |Item { content, log_time_ns }| {
+            let step = match &content {
+                Content::Snapshot(row, _) => row.step,
+                Content::Update(message) => message.step(),
+            };
+            assert_eq!(log_time_ns, step, "the time of its reception");
+            steps.push(step);
+        });
+        steps
+    }
+
+    fn has_snapshot(contents: &[Content]) -> bool {
+        contents.iter().any(|content| matches!(content, Content::Snapshot(..)))
     }
 
     #[test]
     fn snapshots_of_the_period_and_those_with_a_keyframe_are_selected() {
-        let every = NonZeroU32::new(4).unwrap();
-        let mut selector = Selector::new(ContentSelection::new(every, &[Topic::Keyframe]));
-        assert_eq!(select(&mut selector, keyframe(3)), None);
-        let selected: Vec<_> =
-            (0..10).filter(|one| select(&mut selector, snapshot(*one)).is_some()).collect();
+        let mut selector = Selector::new(every_fourth());
+        let selected: Vec<_> = (0..10)
+            .filter(|step| {
+                if *step == 3 {
+                    select(&mut selector, keyframe(3));
+                }
+                has_snapshot(&select(&mut selector, snapshot(*step)))
+            })
+            .collect();
         assert_eq!(selected, [0, 3, 4, 8]);
-        assert_eq!(step_of(selector.take_last_snapshot()), Some(9));
-        assert_eq!(selector.take_last_snapshot(), None);
+        assert_eq!(last_steps(&mut selector), [9]);
+        assert_eq!(last_steps(&mut selector), [0; 0], "it is taken once");
         let counts = selector.take_counts();
         assert_eq!((counts[Topic::Particles].left_out, counts[Topic::Steps].left_out), (5, 5));
-        assert_eq!(counts[Topic::Keyframe].left_out, 1);
         assert_eq!(selector.take_counts(), AllCounts::default());
     }
 
     #[test]
-    fn a_file_ends_with_its_last_snapshot_although_messages_of_the_next_step_come_before_it() {
-        let mut selector = Selector::new(ContentSelection::new(NonZeroU32::new(4).unwrap(), &[]));
+    fn messages_of_the_next_step_follow_the_last_snapshot() {
+        let mut selector = Selector::new(every_fourth());
         for index in 0..=8 {
             select(&mut selector, snapshot(index));
         }
-        assert_eq!(selector.take_last_snapshot(), None, "the last one was selected");
+        assert_eq!(last_steps(&mut selector), [0; 0], "the last one was selected");
         select(&mut selector, snapshot(9));
-        select(&mut selector, keyframe(10));
-        assert_eq!(step_of(selector.take_last_snapshot()), Some(9));
-        assert_eq!(selector.take_last_snapshot(), None, "it is taken once");
+        assert_eq!(select(&mut selector, keyframe(10)), []);
+        assert_eq!(last_steps(&mut selector), [9, 10]);
         select(&mut selector, snapshot(11));
-        selector.take_counts();
-        assert_eq!(selector.take_last_snapshot(), None, "it belongs to the file before");
+        select(&mut selector, keyframe(13));
+        assert_eq!(select(&mut selector, snapshot(13)).len(), 2, "the keyframe and its snapshot");
     }
 
     #[test]
     fn a_recording_of_commands_has_the_particles_of_the_first_state_and_of_those_put_in_place() {
-        let selection = ContentSelection::default().with_only_commands();
+        let selection = ContentSelection { is_only_commands: true, ..ContentSelection::default() };
         let mut selector = Selector::new(selection);
         let states = |selector: &mut Selector, steps: std::ops::Range<u32>| {
             let is_state = |step: &u32| {
                 select(selector, keyframe(u64::from(*step)));
-                matches!(select(selector, snapshot(*step)), Some(Content::Snapshot(..)))
+                has_snapshot(&select(selector, snapshot(*step)))
             };
             steps.filter(is_state).collect::<Vec<_>>()
         };
@@ -302,27 +265,5 @@ mod tests {
         }
         assert_eq!(selector.take_counts()[Topic::Particles].left_out, 29 - 4);
         assert_eq!(states(&mut selector, 40..42), [40], "the first one of the next file");
-    }
-
-    #[test]
-    fn without_particles_the_header_of_a_snapshot_stays() {
-        let mut selector =
-            Selector::new(ContentSelection::new(NonZeroU32::MIN, &[Topic::Particles]));
-        let selected = select(&mut selector, snapshot(5)).unwrap();
-        assert!(matches!(selected, Content::Update(Message::Step(StepRow { step: 5, .. }))));
-    }
-
-    #[test]
-    fn topics_that_readers_need_cannot_be_left_out() {
-        assert_eq!((topic("/status"), topic("steps")), (Ok(Topic::Status), Ok(Topic::Steps)));
-        assert!(topic("stats").unwrap_err().contains("particles"));
-        assert!(topic("partcles").unwrap_err().ends_with(" (did you mean 'particles'?)"));
-        assert!(optional_topic("steps").unwrap_err().starts_with("every reader needs it"));
-        let args =
-            SelectionArgs { topics: vec![Topic::Status, Topic::Tf], ..SelectionArgs::default() };
-        let selection = args.selection();
-        let selected = Topic::ALL.into_iter().filter(|topic| selection.has_topic(*topic));
-        let expected = [Topic::Tf, Topic::Topology, Topic::Surface, Topic::Status, Topic::Steps];
-        assert_eq!(selected.collect::<Vec<_>>(), expected);
     }
 }

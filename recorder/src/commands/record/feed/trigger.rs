@@ -195,7 +195,7 @@ impl Trigger {
 
 #[cfg(test)]
 mod tests {
-    use recorder::{EventRow, Message, OutcomeRow, TearsRow};
+    use recording::{EventRow, Message, OutcomeRow, TearsRow};
     use sim_contract::clock::SECOND_NS;
     use sim_contract::{Action, Command, Outcome, Reason, TearCause, Text, TornConstraint};
 

@@ -1,7 +1,7 @@
 //! The run in progress: the accepted states and messages, the end, and the missing messages.
 
-use recorder::simulation::{FrozenParticles, FrozenTracker};
-use recorder::{
+use recording::simulation::{FrozenParticles, FrozenTracker};
+use recording::{
     AllCounts, CollidersRow, EnergyRow, EventRow, ForcesRow, Message, OutcomeRow, ParametersRow,
     StatusRow, StepRow, TearsRow, Topic,
 };
@@ -102,6 +102,8 @@ pub(super) struct Started {
     keyframe_step: u64,
     /// Step of the newest keyframe in the file.
     recorded_keyframe_step: Option<u64>,
+    /// Step of the newest snapshot that is on its way to the file.
+    written_step: Option<u64>,
     /// Number of torn constraints in the file.
     torn_count: u32,
     /// States that never arrived.
@@ -141,6 +143,7 @@ impl Started {
                 .map_or(header.outcome_count, |previous| previous.next_outcome_of(header)),
             keyframe_step: 0,
             recorded_keyframe_step: None,
+            written_step: None,
             torn_count: u32::try_from(torn_before.len()).unwrap_or(u32::MAX),
             state_gaps: previous.map_or(0, |previous| previous.missing_before(header)),
             next_collider_list: None,
@@ -198,8 +201,26 @@ impl Started {
             rows.extend(events.into_iter().map(Message::Event));
         }
         for message in rows {
-            self.counts[message.topic()].received += 1;
+            self.push(message, accepted);
+        }
+    }
+
+    /// Adds a row. One that describes a state whose snapshot is written has come too late, as over a tunnel, and counts as
+    /// missing: the messages of a file are in the order of steps.
+    fn push(&mut self, message: Message, accepted: &mut Accepted) {
+        let topic = message.topic();
+        if topic.is_of_state() && self.written_step >= Some(message.step()) {
+            self.counts[topic].gaps += 1;
+        } else {
+            self.counts[topic].received += 1;
             accepted.push(message);
+        }
+    }
+
+    /// Marks all accepted snapshots as written.
+    pub(super) fn mark_written(&mut self) {
+        if self.counts[Topic::Steps].received > 0 {
+            self.written_step = Some(self.last.step);
         }
     }
 
@@ -229,8 +250,7 @@ impl Started {
         let frozen = FrozenParticles::find(buffer.particles());
         let events = self.frozen.new_events(header.step, frozen);
         for message in rows.into_iter().chain(events.into_iter().map(Message::Event)) {
-            self.counts[message.topic()].received += 1;
-            accepted.push(message);
+            self.push(message, accepted);
         }
         self.count_gaps(header);
         self.last = *header;
@@ -302,15 +322,16 @@ impl Started {
         row.filter(|row| row.step >= self.first_step).map(Message::Forces)
     }
 
-    /// Returns the row of a keyframe, unless it is in the file. The first one may arrive twice: after
-    /// its state, and with the next one.
+    /// Returns the row of a keyframe, unless it is in the file, or belongs to a snapshot that is. A paused node publishes
+    /// the keyframe of its state for a new reader.
     fn keyframe_row(&mut self, header: &KeyframeHeader, bytes: &[u8]) -> Option<Message> {
         let step = header.step;
-        let is_new = step >= self.first_step && self.recorded_keyframe_step < Some(step);
-        is_new.then(|| {
-            self.recorded_keyframe_step = Some(step);
-            Message::Keyframe { step, bytes: bytes.to_vec() }
-        })
+        if step < self.first_step || self.recorded_keyframe_step >= Some(step) {
+            return None;
+        }
+        self.recorded_keyframe_step = Some(step);
+        let is_late = self.written_step >= Some(step);
+        (!is_late).then(|| Message::Keyframe { step, bytes: bytes.to_vec() })
     }
 
     /// Counts the states and keyframes that are missing before a state.
@@ -338,9 +359,8 @@ impl Started {
                 continue;
             }
             self.counts[Topic::Outcomes].gaps += outcome.index - self.next_outcome;
-            self.counts[Topic::Outcomes].received += 1;
             self.next_outcome = outcome.index.saturating_add(1);
-            accepted.push(Message::Outcome(OutcomeRow::from(&outcome)));
+            self.push(Message::Outcome(OutcomeRow::from(&outcome)), accepted);
         }
     }
 
@@ -388,7 +408,7 @@ impl Started {
         counts[Topic::Particles].gaps = self.state_gaps;
         counts[Topic::Steps].gaps = self.state_gaps;
         counts[Topic::Outcomes].gaps += self.last.outcome_count.saturating_sub(self.next_outcome);
-        counts[Topic::Tears].gaps = u64::from(self.last.torn_count.saturating_sub(self.torn_count));
+        counts[Topic::Tears].gaps += u64::from(self.last.torn_count.saturating_sub(self.torn_count));
         counts[Topic::Parameters].gaps = lost.parameters - self.lost_before.parameters;
         counts
     }

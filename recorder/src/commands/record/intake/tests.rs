@@ -8,7 +8,7 @@ use sim_contract::{
     TornConstraint, Update,
 };
 
-use recorder::{Message, Topic};
+use recording::{Message, Topic};
 
 use super::*;
 use crate::commands::record::accepted::RunEnd;
@@ -272,11 +272,11 @@ fn the_recording_ends_with_the_last_requested_step_and_counts_nothing_after_it()
     let expected = [
         "/keyframe 0",
         "snapshot 0",
-        "/keyframe 1",
         "/outcomes 1",
+        "/keyframe 1",
         "snapshot 1",
-        "/keyframe 2",
         "/outcomes 2",
+        "/keyframe 2",
         "snapshot 2",
     ];
     assert_eq!(names(&accepted)[1..], expected);
@@ -306,12 +306,12 @@ fn messages_are_written_in_the_order_of_publication() {
     updates.extend(outcomes.iter().map(Update::Outcome));
     add(&mut intake, &updates, &mut accepted);
     let expected = [
-        "/keyframe 5",
         "/outcomes 5",
+        "/keyframe 5",
         "/status 5",
         "snapshot 5",
-        "/keyframe 6",
         "/outcomes 6",
+        "/keyframe 6",
         "snapshot 6",
         "/outcomes 7",
     ];

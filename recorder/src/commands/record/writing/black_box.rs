@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use recorder::{Closing, Message, Topic};
+use recording::{Closing, Message, Topic};
 use sim_contract::clock::SECOND_NS;
 
 use crate::cli::output;
@@ -169,7 +169,7 @@ fn repeats(content: &Content, first_step: Option<u64>, closing: &mut Closing) ->
 
 #[cfg(test)]
 mod tests {
-    use recorder::{AllCounts, ParametersRow, ParticleBuffer, StepRow, TearsRow};
+    use recording::{AllCounts, ParametersRow, ParticleBuffer, StepRow, TearsRow};
     use sim_contract::ParameterValues;
 
     use super::*;

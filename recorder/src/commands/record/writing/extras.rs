@@ -6,7 +6,7 @@ use std::io::{Read, Seek, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use recorder::{LogWriter, SCENE_ATTACHMENT, open_regular_file};
+use recording::{LogWriter, SCENE_ATTACHMENT, open_regular_file};
 
 use crate::cli::output;
 

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::bail;
-use recorder::{Existing, LogReader, PartFileError, ReadError, counted};
+use recording::{Existing, LogReader, PartFileError, ReadError, counted};
 use sim_contract::is_being_written;
 
 use crate::cli::output;

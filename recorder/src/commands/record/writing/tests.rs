@@ -1,7 +1,7 @@
 //! A ring of files whose older ones another program moves or blocks.
 
 use clap::Parser;
-use recorder::{AllCounts, RunDescription, Up};
+use recording::{AllCounts, RunDescription, Up};
 
 use super::*;
 

@@ -2,8 +2,8 @@
 
 use std::cmp::Ordering;
 
-use recorder::verification::{SnapshotDifference, snapshot_difference};
-use recorder::{Frame, FrameReader, IndexedLog, LogEnd, ReadError};
+use recording::verification::{SnapshotDifference, snapshot_difference};
+use recording::{Frame, FrameReader, IndexedLog, LogEnd, ReadError};
 use sim_contract::Stop;
 
 /// The result of a comparison, up to the first difference.

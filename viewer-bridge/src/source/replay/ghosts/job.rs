@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Sender;
 
 use anyhow::{Context, bail};
-use recorder::{IndexedLog, Tape};
+use recording::{IndexedLog, Tape};
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{ConstraintState, Stop};
 

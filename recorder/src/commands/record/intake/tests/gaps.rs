@@ -173,3 +173,42 @@ fn changes_of_the_lockstep_between_two_files_are_missing() {
     assert_eq!(rows, ["8: client 2 was dropped from the lockstep: it was not ready in time"]);
     assert_eq!(intake.counts()[Topic::Events].gaps, 1);
 }
+
+#[test]
+fn a_message_behind_its_written_snapshot_is_missing_and_one_before_it_is_not() {
+    let mut intake = started();
+    let mut accepted = publish(&mut intake, header(5, 2), &[]);
+    // Both arrive with the next states, as over a tunnel.
+    Node::new().publish(&mut intake, header(6, 2), &[tears(5, &[0], 1)], &mut accepted).unwrap();
+    accepted.sort();
+    assert_eq!(names(&accepted), ["/tears 5", "snapshot 5", "snapshot 6"]);
+    intake.mark_written();
+    let late = publish(&mut intake, header(7, 2), &[tears(6, &[1], 2), keyframe(6)]);
+    assert_eq!(names(&late), ["snapshot 7"]);
+    let counts = intake.counts();
+    assert_eq!((counts[Topic::Tears].received, counts[Topic::Keyframe].gaps), (1, 0));
+    assert!(counts[Topic::Tears].gaps > 0, "{counts:?}");
+}
+
+#[test]
+fn outcomes_of_later_steps_wait_for_their_states_up_to_the_end_of_the_file() {
+    let mut intake = started();
+    publish(&mut intake, header(5, 2), &[]);
+    let accepted = send(
+        &mut intake,
+        &[2, 3, 4].map(|index| outcome(index, 4 + index)).each_ref().map(Update::Outcome),
+    );
+    assert_eq!(names(&accepted), ["/outcomes 6"]);
+    let mut accepted = publish(&mut intake, header(6, 3), &[]);
+    add(&mut intake, &[], &mut accepted);
+    assert_eq!(names(&accepted), ["snapshot 6", "/outcomes 7"]);
+    let mut accepted = publish(&mut intake, header(7, 4), &[]);
+    add(&mut intake, &[], &mut accepted);
+    assert_eq!(names(&accepted), ["snapshot 7", "/outcomes 8"]);
+    let far = send(&mut intake, &[Update::Outcome(&outcome(5, 20))]);
+    assert!(names(&far).is_empty());
+    let mut rest = Accepted::default();
+    intake.accept_rest(&mut rest);
+    assert_eq!(names(&rest), ["/outcomes 20"]);
+    assert_eq!(missing_count(&intake), 0);
+}

@@ -54,7 +54,7 @@ fn messages_of_earlier_steps_end_a_file_and_those_of_its_step_begin_the_next_one
     Node::new().publish(&mut intake, next, &changes, &mut accepted).unwrap();
     intake.accept_messages(messages, NOW, &mut accepted);
     accepted.sort();
-    let expected = ["/parameters 0", "/keyframe 8", "/outcomes 8", "/status 8", "snapshot 8"];
+    let expected = ["/parameters 0", "/outcomes 8", "/keyframe 8", "/status 8", "snapshot 8"];
     assert_eq!(names(&accepted), expected);
     // Snapshots 5 to 7 are in neither file.
     let missing = [("/particles", 3), ("/steps", 3)];

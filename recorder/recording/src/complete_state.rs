@@ -1,0 +1,130 @@
+//! The complete state of any step of a recording, simulated from the last keyframe before it.
+
+use sim_contract::{ParticleState, Stop, scene_hash};
+
+use crate::log::{Frame, FrameReader, Message, ReadError, Tape, TapeError};
+use crate::recorded_scene::{RecordedSceneError, recorded_scene, scene_to_simulate};
+use crate::verification::{NotIdentical, Resimulation, ResimulationError};
+
+/// A complete state, from which a simulation continues with the recorded bits.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CompleteState {
+    /// Hash of the scene that the state belongs to.
+    pub scene_hash: u64,
+    /// Shape: particle count.
+    pub particles: Vec<ParticleState>,
+    /// The rest of the state: an encoded [`sim_solver::Keyframe`].
+    pub keyframe: Vec<u8>,
+}
+
+/// The reason why a recording gives no complete state of a step.
+#[derive(Debug, thiserror::Error)]
+pub enum CompleteStateError {
+    /// The file cannot be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// A recorded state cannot be read.
+    #[error(transparent)]
+    Tape(#[from] TapeError),
+    /// The recording has no scene that can be simulated again.
+    #[error(transparent)]
+    Scene(#[from] RecordedSceneError),
+    /// The state to start from is invalid.
+    #[error(transparent)]
+    Start(#[from] ResimulationError),
+    /// The simulation does not lead to the recorded states.
+    #[error(transparent)]
+    NotIdentical(#[from] NotIdentical),
+    /// There is no complete state to start from.
+    #[error("has no complete state up to step {step} to start from")]
+    NoStart {
+        /// The wanted step.
+        step: u64,
+    },
+    /// The last complete state is too many steps before the wanted one.
+    #[error("step {step} takes {count} steps from the last complete state (allowed: up to {max})")]
+    TooFar {
+        /// The wanted step.
+        step: u64,
+        /// Number of steps to simulate.
+        count: u64,
+        /// The limit.
+        max: u64,
+    },
+    /// The readable part ends before the step.
+    #[error("ends before step {step}")]
+    Ended {
+        /// The wanted step.
+        step: u64,
+    },
+}
+
+/// Returns the complete state of a step, also of one whose snapshot is not in the file.
+///
+/// It is simulated from the last complete state up to the step, for at most `steps_max` steps, and compared
+/// with every snapshot on the way. A step without a snapshot is proved by the next snapshot. After a signal, it ends with [`ReadError::Interrupted`] or [`NotIdentical::Interrupted`].
+///
+/// # Errors
+/// If the file cannot be read, or the recording does not lead to the step.
+pub fn complete_state(
+    tape: &mut Tape,
+    step: u64,
+    steps_max: u64,
+    stop: &Stop,
+) -> Result<CompleteState, CompleteStateError> {
+    let first = find_start(tape, step)?;
+    let begin = first.row.step;
+    let count = step - begin;
+    if count > steps_max {
+        return Err(CompleteStateError::TooFar { step, count, max: steps_max });
+    }
+    let mut frames = FrameReader::new(tape.log().reader(stop)?);
+    let log = frames.log();
+    let scene = match count {
+        0 => recorded_scene(log)?,
+        _ => scene_to_simulate(log)?,
+    };
+    let scene_hash = scene_hash(log.scene());
+    let simulation = Resimulation::start(&scene, &first)?;
+    let mut simulation = simulation.ok_or(CompleteStateError::NoStart { step })?;
+    simulation.compare_start(&first).require_identical()?;
+    if count > 0 {
+        tape.wind(&mut frames, begin)?;
+    }
+    while simulation.step() < step {
+        let frame = frames.next_frame()?.ok_or(CompleteStateError::Ended { step })?;
+        if frame.row.step > step {
+            simulation.advance_to(step, &frame, stop.flag()).require_identical()?;
+            let state = state_of(&simulation, scene_hash);
+            simulation.advance(&frame, stop.flag()).require_identical()?;
+            return Ok(state);
+        }
+        simulation.advance(&frame, stop.flag()).require_identical()?;
+    }
+    Ok(state_of(&simulation, scene_hash))
+}
+
+/// Returns the last complete state up to a step.
+fn find_start(tape: &mut Tape, step: u64) -> Result<Frame, CompleteStateError> {
+    let mut up_to = step;
+    loop {
+        let no_start = CompleteStateError::NoStart { step };
+        let Some((begin, bytes)) = tape.keyframe_at(up_to)? else { return Err(no_start) };
+        let state = tape.state_at(begin)?;
+        // The snapshot or the header of the keyframe may be missing.
+        if state.has_readable_row && state.row.step == begin {
+            return Ok(Frame {
+                updates: vec![Message::Keyframe { step: begin, bytes }],
+                row: state.row,
+                particles: Some(state.particles.to_vec()),
+                log_times_ns: Vec::new(),
+            });
+        }
+        up_to = begin.checked_sub(1).ok_or(no_start)?;
+    }
+}
+
+fn state_of(simulation: &Resimulation, scene_hash: u64) -> CompleteState {
+    let (particles, keyframe) = (simulation.particles().to_vec(), simulation.keyframe().encode());
+    CompleteState { scene_hash, particles, keyframe }
+}

@@ -1,0 +1,54 @@
+//! The recording format, from the bytes of a message to the state at any step, and files of commands in
+//! the form of its outcomes.
+
+mod backlog;
+mod command_file;
+mod container;
+pub(crate) mod encoding;
+mod index;
+mod message;
+mod read;
+mod rows;
+mod run;
+mod state_hash;
+mod tape;
+mod tears;
+mod topic;
+mod writer;
+
+pub use backlog::Backlog;
+pub use command_file::{CommandFileError, TimedCommand, parse_commands, sort_commands};
+pub use container::check::check_file;
+pub use container::finding::{
+    AfterEnd, CheckExtent, CheckReport, Cure, Finding, Findings, RepairReport,
+};
+pub use container::losses::{Losses, LostSteps};
+pub use container::lost_load::{LoadRows, LostLoad};
+pub use container::repair::{RepairError, repair_file};
+pub use encoding::{
+    MAP_FRAME, MessageEncoder, ParticleBuffer, TopicFormat, TopicSchema, WORLD_FRAME,
+    encode_transform, map_from_world, scene_format,
+};
+pub use index::{ChunkEntry, IndexedLog};
+pub use message::Message;
+pub use read::decode::LoggedMessage;
+pub use read::file_source::{FileSource, SharedFile};
+pub use read::frames::{Frame, FrameReader};
+pub use read::gaps::GapCounter;
+pub use read::open::open_regular_file;
+pub use read::read_error::{LogEnd, ReadError};
+pub use read::reader::{LogReader, open_recording};
+pub use rows::{
+    AnchorForceRow, BendColumns, ColliderBodyRow, ColliderDetails, ColliderForceRow, ColliderRow,
+    CollidersRow, EnergyRow, EventRow, ForcesRow, MeshFile, OutcomeRow, ParametersRow,
+    SceneColliders, ShapeRow, Softness, StatusRow, StepRow, SurfaceRow, TearsRow, TopologyRow,
+    bend_state, constraint_state,
+};
+pub use run::selection::ContentSelection;
+pub use run::{CLOSING_METADATA, Closing, FORMAT_VERSION, RunDescription, SCENE_ATTACHMENT};
+pub use state_hash::state_hash;
+pub use tape::{Tape, TapeError, TapeState};
+pub use tears::{TearTracker, torn_before_first};
+pub use topic::{AllCounts, Topic, TopicCounts};
+pub(crate) use writer::replace_run_id;
+pub use writer::{Compression, LogOptions, LogWriter, WriteError};

@@ -1,0 +1,473 @@
+//! The check of a whole file: structure, checksums, index, messages and hashes.
+
+use std::collections::BTreeSet;
+use std::io::{Read, Seek};
+
+use mcap::records::{Channel, Footer, Header, MessageHeader, Metadata, Record, op};
+use sim_contract::Stop;
+
+use super::attachment::no_checksum;
+use super::chunk::{Chunk, ChunkContent, InnerRecords};
+use super::content::ContentCheck;
+use super::finding::{CheckExtent, CheckReport, Findings, after_end_text, record_name};
+use super::places::Places;
+use super::summary::{SummaryCheck, is_of_index};
+use super::walk::{Part, Walk};
+use super::window::Window;
+use crate::log::read::limits::{RECORD_HEADER_SIZE_BYTES, SizeLimits};
+use crate::log::read::read_error::{LogEnd, ReadError};
+use crate::log::run::selection::{ContentSelection, SELECTION_METADATA};
+use crate::log::run::{CLOSING_METADATA, Closing, RUN_METADATA, SCENE_ATTACHMENT};
+use crate::log::topic::Topic;
+
+/// Bytes between two calls of the progress callback.
+const PROGRESS_PERIOD_BYTES: u64 = 16 << 20;
+
+/// Most parts of other programs that a report names.
+const NOT_CHECKED_MAX: usize = 16;
+
+/// Checks every byte of a file. Calls `on_progress` with the position and the size of the file.
+///
+/// # Errors
+/// If the operating system reports an error, a signal has arrived, or the file is not a recording.
+pub fn check_file<R: Read + Seek>(
+    source: R,
+    stop: Option<&Stop>,
+    on_progress: &mut dyn FnMut(u64, u64),
+) -> Result<CheckReport, ReadError> {
+    let mut walk = Walk::new(Window::new(source, stop.cloned())?)?;
+    let mut check = Check::default();
+    let mut chunks = ChunkContent::default();
+    let mut next_progress = 0;
+    loop {
+        if walk.position() >= next_progress {
+            on_progress(walk.position(), walk.size_bytes());
+            next_progress = walk.position() + PROGRESS_PERIOD_BYTES;
+        }
+        let Some(part) = walk.next()? else { break };
+        let section_end = check.add(part, &mut chunks)?;
+        check.end_section(section_end, &mut walk);
+        if let Some(limits) = check.new_limits.take() {
+            walk.set_limits(limits);
+        }
+    }
+    check.finish(walk.size_bytes())
+}
+
+/// A record that ends a section and has its checksum.
+enum SectionEnd {
+    None,
+    Data { byte: u64, saved: u32 },
+    Summary { byte: u64, record: Vec<u8>, saved: u32 },
+}
+
+/// The record of the file that holds a message.
+#[derive(Debug, Clone, Copy)]
+struct InFile {
+    byte: u64,
+    record: &'static str,
+}
+
+/// The state of a check.
+#[derive(Default)]
+struct Check {
+    findings: Findings,
+    extent: CheckExtent,
+    header: Option<Header>,
+    scene_size_bytes: usize,
+    selection: ContentSelection,
+    content: Option<ContentCheck>,
+    first_step: Option<u64>,
+    /// The limits of the scene, until the walk has them.
+    new_limits: Option<SizeLimits>,
+    closing: Option<Closing>,
+    places: Places,
+    /// A part of the file is damaged, so its index and its counts differ from the rest.
+    has_damage: bool,
+    /// Channels without a declaration, which are reported once.
+    undeclared: BTreeSet<u16>,
+    /// `None` before the end of the data.
+    summary: Option<SummaryCheck>,
+}
+
+impl Check {
+    /// Checks a part of the file.
+    fn add(&mut self, part: Part<'_>, chunks: &mut ChunkContent) -> Result<SectionEnd, ReadError> {
+        match part {
+            Part::Record { byte, opcode, body } => self.add_record(byte, opcode, body, chunks),
+            Part::Skipped { opcode: op::CHUNK, .. } => Err(self.no_run()),
+            Part::Skipped { byte, opcode } => {
+                self.not_checked(format!("the {} at byte {byte}", record_name(opcode)));
+                Ok(SectionEnd::None)
+            }
+            Part::LongAttachment { attachment, checksum } => {
+                let what = attachment.check(checksum, &mut self.findings, &mut self.places);
+                if let Some(what) = what {
+                    self.not_checked(what);
+                }
+                Ok(SectionEnd::None)
+            }
+            Part::Damaged { bytes, cause } => {
+                let what = format!("{} bytes are damaged: {cause}", bytes.end - bytes.start);
+                self.findings.add(bytes.start, "damaged record", what);
+                self.mark_gap();
+                self.allow_scene(bytes.end - bytes.start);
+                Ok(SectionEnd::None)
+            }
+            Part::Truncated { byte } => {
+                self.findings.add(byte, "end of the file", "the file is truncated here");
+                Ok(SectionEnd::None)
+            }
+            Part::AfterEnd { bytes } => {
+                self.findings.add(bytes.start, "end of the file", after_end_text(&bytes));
+                Ok(SectionEnd::None)
+            }
+        }
+    }
+
+    /// Adds content that cannot be checked.
+    fn not_checked(&mut self, what: String) {
+        let all = &mut self.extent.not_checked;
+        match all.len() {
+            0..NOT_CHECKED_MAX => all.push(what),
+            NOT_CHECKED_MAX => all.push("more content of other programs".to_owned()),
+            _ => {}
+        }
+    }
+
+    /// Allows for a scene in a damaged part before the first message.
+    fn allow_scene(&mut self, size_bytes: u64) {
+        if self.content.is_none() {
+            let size_bytes = usize::try_from(size_bytes).unwrap_or(usize::MAX);
+            self.scene_size_bytes = size_bytes.min(sim_contract::SCENE_SIZE_BYTES_MAX);
+        }
+    }
+
+    fn mark_gap(&mut self) {
+        self.has_damage = true;
+        self.places.end_chunk();
+        if let Some(content) = &mut self.content {
+            content.mark_gap();
+        }
+    }
+
+    fn add_record(
+        &mut self,
+        byte: u64,
+        opcode: u8,
+        body: &[u8],
+        chunks: &mut ChunkContent,
+    ) -> Result<SectionEnd, ReadError> {
+        if opcode != op::MESSAGE_INDEX && self.places.end_chunk() {
+            let what = "a message index is missing after the chunk before";
+            self.findings.add_index(byte, "chunk", what);
+        }
+        if opcode == op::CHUNK {
+            self.add_chunk(byte, body, chunks)?;
+            return Ok(SectionEnd::None);
+        }
+        let record = match mcap::parse_record(opcode, body) {
+            Ok(record) => record,
+            Err(error) => {
+                self.findings.add(byte, record_name(opcode), error.to_string());
+                self.mark_gap();
+                self.allow_scene(body.len() as u64);
+                return Ok(SectionEnd::None);
+            }
+        };
+        let size_bytes = (RECORD_HEADER_SIZE_BYTES + body.len()) as u64;
+        if let Some(summary) = &mut self.summary {
+            if let Err(what) = summary.check(byte, &record, size_bytes, &mut self.places)
+                && !self.has_damage
+            {
+                self.findings.add_index(byte, record_name(opcode), what);
+            }
+        } else {
+            self.add_data_record(byte, &record, size_bytes)?;
+        }
+        Ok(section_end(byte, &record, body))
+    }
+
+    /// Checks a record before the end of the data.
+    fn add_data_record(
+        &mut self,
+        byte: u64,
+        record: &Record<'_>,
+        size_bytes: u64,
+    ) -> Result<(), ReadError> {
+        let result = match record {
+            Record::Header(header) if self.header.is_none() => {
+                self.header = Some(header.clone());
+                Ok(())
+            }
+            Record::Attachment { header, data, crc } => {
+                if *crc == 0 {
+                    self.not_checked(no_checksum(&header.name));
+                }
+                if header.name == SCENE_ATTACHMENT && self.content.is_none() {
+                    self.scene_size_bytes = data.len();
+                }
+                self.places.add_attachment(byte, size_bytes, header, data.len() as u64);
+                Ok(())
+            }
+            Record::Metadata(metadata) => {
+                self.places.add_metadata(byte, size_bytes, &metadata.name);
+                self.add_metadata(metadata)?;
+                Ok(())
+            }
+            // The chunk before it is damaged.
+            Record::MessageIndex(_) if self.has_damage && !self.places.has_chunk() => Ok(()),
+            Record::MessageIndex(index) => self.places.check_message_index(byte, size_bytes, index),
+            Record::Message { header, data } => {
+                self.add_message(InFile { byte, record: "message" }, header, data, 0);
+                Ok(())
+            }
+            Record::Schema { header, .. } => {
+                self.add_schema(header.id);
+                Ok(())
+            }
+            Record::Channel(channel) => self.add_channel(channel),
+            Record::DataEnd(_) => Ok(()),
+            Record::Footer(_) => Err("the end of the data is missing before it".to_owned()),
+            other if is_of_index(other.opcode()) => {
+                Err("it stands before the end of the data".to_owned())
+            }
+            _ => Err("it does not belong here".to_owned()),
+        };
+        if let Err(what) = result {
+            self.findings.add_index(byte, record_name(record.opcode()), what);
+        }
+        Ok(())
+    }
+
+    fn add_metadata(&mut self, metadata: &Metadata) -> Result<(), ReadError> {
+        if metadata.name == RUN_METADATA && self.content.is_none() {
+            self.begin_content(metadata)?;
+        } else if metadata.name == SELECTION_METADATA {
+            self.selection = ContentSelection::read(&metadata.metadata)?;
+        } else if metadata.name == CLOSING_METADATA {
+            self.closing = Some(Closing::from_map(&metadata.metadata));
+        }
+        Ok(())
+    }
+
+    fn begin_content(&mut self, run: &Metadata) -> Result<(), ReadError> {
+        let content = ContentCheck::new(&run.metadata, self.selection, self.scene_size_bytes)?;
+        self.new_limits = Some(*content.limits());
+        self.content = Some(content);
+        Ok(())
+    }
+
+    fn add_schema(&mut self, id: u16) {
+        self.places.schemas.insert(id);
+        let count = u16::try_from(self.places.schemas.len()).unwrap_or(u16::MAX);
+        self.places.statistics.schema_count = count;
+    }
+
+    fn add_channel(&mut self, channel: &Channel) -> Result<(), String> {
+        let content = self.content.as_mut().ok_or("it stands before the metadata 'run'")?;
+        self.places.statistics.channel_count += u32::from(!content.is_declared(channel.id));
+        content.add_channel(channel)
+    }
+
+    fn add_chunk(
+        &mut self,
+        byte: u64,
+        body: &[u8],
+        chunks: &mut ChunkContent,
+    ) -> Result<(), ReadError> {
+        let Some(content) = &self.content else {
+            return Err(self.no_run());
+        };
+        self.extent.chunk_count += 1;
+        let limits = *content.limits();
+        match chunks.read(body, &limits)? {
+            Ok(chunk) => self.add_content(byte, body.len(), &chunk),
+            Err(cause) => {
+                self.findings.add(byte, "chunk", cause);
+                self.places.statistics.chunk_count += 1;
+                self.mark_gap();
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns the error of a file without a readable description of its run.
+    fn no_run(&self) -> ReadError {
+        let Some(first) = self.findings.list().first() else {
+            let library = self.header.as_ref().map_or("", |header| header.library.as_str());
+            return ReadError::Foreign { library: library.to_owned() };
+        };
+        ReadError::NoHeader(LogEnd::Damaged { byte: first.byte, cause: first.what.clone() })
+    }
+
+    fn add_content(&mut self, byte: u64, body_size: usize, chunk: &Chunk<'_>) {
+        let size_bytes = (RECORD_HEADER_SIZE_BYTES + body_size) as u64;
+        self.places.begin_chunk(byte, size_bytes, &chunk.header);
+        if !chunk.has_checksum && !chunk.content.is_empty() {
+            self.findings.add_index(byte, "chunk", "it has no checksum");
+        }
+        for record in InnerRecords::new(chunk.content) {
+            let result = record.and_then(|inner| {
+                match mcap::parse_record(inner.opcode, inner.body) {
+                    Ok(Record::Schema { header, .. }) => self.add_schema(header.id),
+                    Ok(Record::Channel(channel)) => self.add_channel(&channel)?,
+                    Ok(Record::Message { header, data }) => {
+                        let place = InFile { byte, record: "chunk, message" };
+                        self.add_message(place, &header, &data, inner.offset);
+                    }
+                    Ok(other) => return Err(format!("a {} in it", record_name(other.opcode()))),
+                    Err(error) => return Err(error.to_string()),
+                }
+                Ok(())
+            });
+            if let Err(what) = result {
+                self.findings.add(byte, "chunk", what);
+            }
+        }
+        if let Err(what) = self.places.check_times() {
+            self.findings.add_index(byte, "chunk", what);
+        }
+    }
+
+    fn add_message(&mut self, place: InFile, header: &MessageHeader, data: &[u8], offset: u64) {
+        self.places.add_message(header, offset);
+        self.extent.message_count += 1;
+        let Some(content) = &mut self.content else { return };
+        let result = content.check(header, data);
+        if !content.is_declared(header.channel_id) && !self.undeclared.insert(header.channel_id) {
+            return;
+        }
+        if let Err(what) = result {
+            let topic = content.topic(header.channel_id);
+            let on = topic.map_or_else(String::new, |topic| format!(" on {}", topic.name()));
+            self.findings.add(place.byte, format!("{}{on}", place.record), what);
+        }
+        if self.first_step.is_none() {
+            self.first_step = content.last_row().map(|row| row.step);
+        }
+    }
+
+    /// Compares the checksum of a section.
+    fn end_section<R: Read + Seek>(&mut self, end: SectionEnd, walk: &mut Walk<R>) {
+        let (byte, saved, calculated, section) = match end {
+            SectionEnd::None => return,
+            SectionEnd::Data { byte, saved } => {
+                let calculated = walk.checksum_before();
+                walk.restart_checksum();
+                if self.summary.is_none() {
+                    self.summary = Some(SummaryCheck::new(walk.position()));
+                }
+                (byte, saved, calculated, "data")
+            }
+            SectionEnd::Summary { byte, record, saved } => {
+                (byte, saved, walk.summary_checksum(&record), "index")
+            }
+        };
+        let record = if section == "data" { "end of the data" } else { "footer" };
+        if saved == 0 {
+            self.findings.add_index(byte, record, format!("the {section} has no checksum"));
+        } else if saved != calculated && (section == "index" || !self.has_damage) {
+            self.findings.add_index(
+                byte,
+                record,
+                format!(
+                    "the checksum of the {section} before it is {saved:08x}, but those bytes have \
+                     {calculated:08x}"
+                ),
+            );
+        } else if section == "index" {
+            self.check_index(byte);
+        }
+    }
+
+    fn check_index(&mut self, byte: u64) {
+        let Some(summary) = &self.summary else { return };
+        if let Err(what) = summary.check_complete(&self.places)
+            && !self.has_damage
+        {
+            self.findings.add_index(byte, "footer", what);
+        }
+    }
+
+    fn finish(mut self, size_bytes: u64) -> Result<CheckReport, ReadError> {
+        let Some(mut content) = self.content.take() else {
+            return Err(self.no_run());
+        };
+        if let Some(step) = content.take_row() {
+            let what = format!("step {step}: the row in /steps has no snapshot after it");
+            self.findings.add(size_bytes, "end of the file", what);
+        }
+        self.check_declared(&content, size_bytes);
+        let extent = &mut self.extent;
+        extent.size_bytes = size_bytes;
+        extent.snapshot_count = content.counts[Topic::Particles].written;
+        let last = content.last_row().map(|row| row.step);
+        extent.steps = self.first_step.zip(last).map(|(first, last)| [first, last]);
+        extent.unhashed_count = content.unhashed_count;
+        if extent.unhashed_count > 0 {
+            extent.not_checked.push(format!(
+                "the hash of {} snapshots, whose torn constraints are in missing messages",
+                extent.unhashed_count
+            ));
+        }
+        Ok(CheckReport { findings: self.findings, extent: self.extent })
+    }
+
+    /// Compares the messages that are missing with those that the file declares.
+    fn check_declared(&mut self, content: &ContentCheck, end: u64) {
+        let found = content.gaps.counts();
+        let Some(closing) = &self.closing else {
+            if self.findings.count() == 0 {
+                self.findings.add_index(
+                    end,
+                    "end of the file",
+                    "the metadata 'recorder' is missing",
+                );
+            }
+            return;
+        };
+        self.extent.declared_missing =
+            closing.missing().values().fold(0, |sum, count| sum.saturating_add(*count));
+        if self.has_damage {
+            return;
+        }
+        for topic in Topic::ALL {
+            let (claimed, counted) = (closing.counts[topic], content.counts[topic]);
+            let declared = claimed.lost.saturating_add(claimed.gaps);
+            let name = topic.name();
+            if found[topic].gaps > declared {
+                let what = format!(
+                    "{} messages on {name} are missing, but the file declares {declared}",
+                    found[topic].gaps
+                );
+                self.findings.add_missing(end, "metadata 'recorder'", what);
+            }
+            if claimed.written != counted.written {
+                let what = format!(
+                    "it counts {} messages on {name}, but the file has {}",
+                    claimed.written, counted.written
+                );
+                if claimed.written > counted.written {
+                    self.findings.add_missing(end, "metadata 'recorder'", what);
+                } else {
+                    self.findings.add_index(end, "metadata 'recorder'", what);
+                }
+            }
+        }
+    }
+}
+
+/// Returns the checksum of the section that a record ends.
+fn section_end(byte: u64, record: &Record<'_>, body: &[u8]) -> SectionEnd {
+    match record {
+        Record::DataEnd(end) => SectionEnd::Data { byte, saved: end.data_section_crc },
+        Record::Footer(Footer { summary_crc, .. }) => {
+            let header = [&[op::FOOTER][..], &(body.len() as u64).to_le_bytes()].concat();
+            let checked = &body[..body.len() - size_of::<u32>()];
+            let record = [&header, checked].concat();
+            SectionEnd::Summary { byte, record, saved: *summary_crc }
+        }
+        _ => SectionEnd::None,
+    }
+}

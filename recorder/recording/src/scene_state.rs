@@ -1,0 +1,309 @@
+//! The state of a scene at a snapshot, with everything that pictures and meshes show.
+
+use std::io::Read;
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+use sim_contract::{
+    ColliderState, ConstraintState, ParameterValues, ParticleState, Torn, Triangle,
+};
+use sim_solver::scene::{ColliderMesh, ColliderMeshes};
+use sim_solver::{EnergyMeter, Scene, Solver, TornSides};
+
+use crate::log::{
+    ColliderRow, CollidersRow, EnergyRow, ForcesRow, Frame, FrameReader, LogReader, Message,
+    OutcomeRow, ReadError, ShapeRow, StepRow, Tape, TapeError, TearTracker, constraint_state,
+};
+use crate::recorded_scene::recorded_scene;
+use crate::simulation::{colliders_row, forces_row, step_row};
+
+/// The reason why the state of a recording cannot be shown.
+#[derive(Debug, thiserror::Error)]
+pub enum SceneStateError {
+    /// The file cannot be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// The file has no such state.
+    #[error(transparent)]
+    Tape(#[from] TapeError),
+    /// Columns of /topology differ in length.
+    #[error("the columns of /topology differ in length")]
+    Topology,
+    /// The last triangle of /surface has fewer than three corners.
+    #[error("the number of indices in /surface is not a multiple of three")]
+    Surface,
+    /// The recording has a torn constraint that /topology does not list.
+    #[error("constraint {constraint} is torn but not in /topology")]
+    Torn {
+        /// Index of the constraint.
+        constraint: u32,
+    },
+    /// A constraint or a triangle refers to a particle that the snapshot does not have.
+    #[error(
+        "the snapshot of step {step} has {count} particles, but /topology or /surface refers to particle {index}"
+    )]
+    Particle {
+        /// Step of the snapshot.
+        step: u64,
+        /// Number of its particles.
+        count: usize,
+        /// Index of the particle.
+        index: u32,
+    },
+}
+
+/// The state at one snapshot.
+#[derive(Debug, Clone, Default)]
+pub struct SceneState {
+    /// The row of its step.
+    pub row: StepRow,
+    /// The particles.
+    pub particles: Vec<ParticleState>,
+    /// The constraints as loaded.
+    pub constraints: Vec<ConstraintState>,
+    /// By constraint index: torn at or before the step.
+    pub is_torn: Vec<bool>,
+    /// The triangles as loaded.
+    pub triangles: Vec<Triangle>,
+    /// The torn sides of the triangles. `None` if no constraint has torn yet.
+    pub sides: Option<TornSides>,
+    /// The colliders, in their poses after the step.
+    pub colliders: Vec<ColliderRow>,
+    /// The triangles of the colliders that are meshes. `None` if no collider is a mesh.
+    pub collider_meshes: Option<Arc<ColliderMeshes>>,
+    /// The outcomes of commands since the last visited state, from the first visited step on.
+    pub outcomes: Vec<OutcomeRow>,
+    /// The forces of the step, if the recording has them.
+    pub forces: Option<ForcesRow>,
+    /// The parameters of the step, if the recording has them.
+    pub parameters: Option<ParameterValues>,
+}
+
+/// Reads a recording and calls `visit` with its state at each of `steps`, which ascend, or at each recorded
+/// step, until `visit` breaks.
+///
+/// # Errors
+/// The file cannot be read, its messages contradict each other, or `visit` fails.
+pub fn visit_states<R: Read, E: From<SceneStateError>>(
+    log: LogReader<R>,
+    steps: Option<&[u64]>,
+    mut visit: impl FnMut(&SceneState) -> Result<ControlFlow<()>, E>,
+) -> Result<(), E> {
+    let first_step = steps.and_then(|steps| steps.first().copied()).unwrap_or_default();
+    let mut steps = steps.map(|steps| steps.iter().copied().peekable());
+    let mut frames = FrameReader::new(log);
+    let mut state = SceneState::default();
+    let mut tears = TearTracker::new(Torn::default());
+    while steps.as_mut().is_none_or(|steps| steps.peek().is_some()) {
+        let Some(frame) = frames.next_frame().map_err(SceneStateError::from)? else { break };
+        state.apply_frame(frame, &mut tears)?;
+        state.read_meshes(frames.log());
+        state.outcomes.retain(|row| row.step >= first_step);
+        let step = state.row.step;
+        if steps.as_mut().is_none_or(|steps| steps.next_if_eq(&step).is_some()) {
+            state.set_torn(tears.torn().iter().flat_map(|torn| torn.indices()))?;
+            state.check_indices()?;
+            if visit(&state)?.is_break() {
+                break;
+            }
+            state.outcomes.clear();
+        }
+    }
+    Ok(())
+}
+
+impl SceneState {
+    /// Reads the state at a recorded step. `scene` has the triangles of colliders that are meshes.
+    ///
+    /// # Errors
+    /// The file cannot be read, or its messages contradict each other.
+    pub fn of_tape(
+        tape: &mut Tape,
+        step: u64,
+        scene: Option<&Scene>,
+    ) -> Result<Self, SceneStateError> {
+        let found = tape.state_at(step)?;
+        let constraints = tape.topology().constraints().ok_or(SceneStateError::Topology)?;
+        let mut state = Self {
+            row: found.row,
+            particles: found.particles.to_vec(),
+            constraints,
+            triangles: tape.surface().triangles().ok_or(SceneStateError::Surface)?,
+            colliders: found.colliders.map_or_else(Vec::new, |row| row.colliders),
+            ..Self::default()
+        };
+        state.set_torn(found.torn.indices())?;
+        if state.has_meshes() {
+            state.collider_meshes = scene.map(|scene| Arc::new(scene.collider_meshes()));
+        }
+        state.check_indices()?;
+        Ok(state)
+    }
+
+    /// Returns the state of a solver after a step.
+    pub fn of_solver(solver: &Solver, scene: &Scene, step: u64) -> Self {
+        let constraints: Vec<_> = solver.constraints().map(constraint_state).collect();
+        let triangles = solver.triangles().iter();
+        let mut state = Self {
+            row: step_row(solver, step),
+            particles: bytemuck::cast_slice(solver.particles()).to_vec(),
+            constraints,
+            triangles: triangles.map(|corners| Triangle { corners: *corners }).collect(),
+            colliders: colliders_row(solver, step).colliders,
+            forces: forces_row(solver, step),
+            ..Self::default()
+        };
+        // A solver tears only constraints that it has.
+        let _is_torn = state.set_torn(solver.torn().iter().copied());
+        if state.has_meshes() {
+            state.collider_meshes = Some(Arc::new(scene.collider_meshes()));
+        }
+        state
+    }
+
+    fn apply_frame(
+        &mut self,
+        frame: Frame,
+        tears: &mut TearTracker,
+    ) -> Result<(), SceneStateError> {
+        self.forces = None;
+        for message in &frame.updates {
+            if let Message::Topology(row) = message {
+                *tears = TearTracker::new(row.torn_before());
+            }
+            tears.process(message);
+            self.apply_message(message)?;
+        }
+        self.row = frame.row;
+        self.particles = frame.particles.unwrap_or_default();
+        Ok(())
+    }
+
+    fn apply_message(&mut self, message: &Message) -> Result<(), SceneStateError> {
+        match message {
+            Message::Topology(row) => {
+                self.constraints = row.constraints().ok_or(SceneStateError::Topology)?;
+                self.sides = None;
+            }
+            Message::Surface(row) => {
+                self.triangles = row.triangles().ok_or(SceneStateError::Surface)?;
+                self.sides = None;
+            }
+            Message::Colliders(row) => self.colliders.clone_from(&row.colliders),
+            Message::Outcome(row) => self.outcomes.push(row.clone()),
+            Message::Forces(row) => self.forces = Some(row.clone()),
+            Message::Parameters(row) => self.parameters = Some(row.values.clone()),
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// Reads the triangles of colliders from the scene of the recording. Without a readable scene, the state has no
+    /// triangles of colliders.
+    fn read_meshes<R: Read>(&mut self, log: &LogReader<R>) {
+        if self.collider_meshes.is_none() && self.has_meshes() {
+            let meshes = recorded_scene(log).map(|scene| scene.collider_meshes());
+            self.collider_meshes = Some(Arc::new(meshes.unwrap_or_default()));
+        }
+    }
+
+    fn has_meshes(&self) -> bool {
+        self.colliders.iter().any(|one| matches!(one.shape, ShapeRow::Mesh { .. }))
+    }
+
+    /// Returns the recorded energy of the state, or measures the energy. `None` if the parameters were not recorded, or
+    /// the state is not a state of the scene.
+    pub fn energy(&self, meter: &mut EnergyMeter) -> Option<EnergyRow> {
+        self.row.energy.or_else(|| {
+            let particles = bytemuck::cast_slice(&self.particles);
+            let parameters = self.parameters.as_ref()?;
+            meter.measure(particles, self.torn_constraints(), parameters).map(EnergyRow::from)
+        })
+    }
+
+    /// Returns the triangles of a collider that is a mesh.
+    pub fn collider_mesh(&self, collider: usize) -> Option<&ColliderMesh> {
+        self.collider_meshes.as_ref()?.get(&collider)
+    }
+
+    /// Replaces the torn constraints.
+    ///
+    /// # Errors
+    /// If a torn constraint is not in the topology. The error names the first one.
+    pub fn set_torn(&mut self, torn: impl Iterator<Item = u32>) -> Result<(), SceneStateError> {
+        self.is_torn.clear();
+        self.is_torn.resize(self.constraints.len(), false);
+        for constraint in torn {
+            let is_torn = self.is_torn.get_mut(constraint as usize);
+            *is_torn.ok_or(SceneStateError::Torn { constraint })? = true;
+        }
+        let Self { constraints, triangles, is_torn, sides, .. } = self;
+        if sides.is_none() && is_torn.contains(&true) {
+            let ends = constraints.iter().map(|one| [one.a, one.b]);
+            let corners = triangles.iter().map(|one| one.corners);
+            *sides = Some(TornSides::of_triangles(ends, corners));
+        }
+        if let Some(sides) = sides {
+            sides.set_torn(indices(is_torn));
+        }
+        Ok(())
+    }
+
+    /// Returns the indices of the torn constraints, ascending.
+    pub fn torn_constraints(&self) -> impl Iterator<Item = u32> {
+        indices(&self.is_torn)
+    }
+
+    /// Returns the colliders as a node publishes them.
+    pub fn collider_states(&self) -> Vec<ColliderState> {
+        let (step, colliders) = (self.row.step, self.colliders.clone());
+        CollidersRow { step, colliders }.states()
+    }
+
+    /// Returns the constraints that are not torn.
+    pub fn untorn_constraints(&self) -> impl Iterator<Item = &ConstraintState> {
+        let constraints = self.constraints.iter().zip(&self.is_torn);
+        constraints.filter(|(_, is_torn)| !**is_torn).map(|(constraint, _)| constraint)
+    }
+
+    /// Returns the index and the corners of each triangle without a torn side.
+    pub fn intact_triangles(&self) -> impl Iterator<Item = (usize, [u32; 3])> {
+        let is_whole = |triangle| self.sides.as_ref().is_none_or(|sides| sides.is_whole(triangle));
+        let triangles = (0_u32..).zip(&self.triangles);
+        triangles
+            .filter(move |(triangle, _)| is_whole(*triangle))
+            .map(|(triangle, one)| (triangle as usize, one.corners))
+    }
+
+    /// Returns for each particle whether an untorn constraint or an intact triangle uses it.
+    pub fn connected(&self) -> Vec<bool> {
+        let mut is_connected = vec![false; self.particles.len()];
+        let ends = self.untorn_constraints().flat_map(|constraint| [constraint.a, constraint.b]);
+        let corners = self.intact_triangles().flat_map(|(_, corners)| corners);
+        for index in ends.chain(corners) {
+            is_connected[index as usize] = true;
+        }
+        is_connected
+    }
+
+    /// Checks that all constraints and triangles refer to existing particles.
+    ///
+    /// # Errors
+    /// If a constraint or a triangle refers to a particle that does not exist. The error names the largest index.
+    pub fn check_indices(&self) -> Result<(), SceneStateError> {
+        let ends = self.constraints.iter().flat_map(|constraint| [constraint.a, constraint.b]);
+        let corners = self.triangles.iter().flat_map(|triangle| triangle.corners);
+        let (step, count) = (self.row.step, self.particles.len());
+        match ends.chain(corners).max() {
+            Some(index) if index as usize >= count => {
+                Err(SceneStateError::Particle { step, count, index })
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Returns the indices at which the value is true.
+fn indices(is_torn: &[bool]) -> impl Iterator<Item = u32> {
+    (0_u32..).zip(is_torn).filter(|(_, is_torn)| **is_torn).map(|(index, _)| index)
+}

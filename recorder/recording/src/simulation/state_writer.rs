@@ -1,0 +1,196 @@
+//! Writes the states of a solver in the order in which a node publishes.
+
+use std::io::Write;
+
+use crate::log::{
+    Closing, ColliderRow, LogOptions, LogWriter, Message, OutcomeRow, ParametersRow,
+    RunDescription, SceneColliders, StepRow, SurfaceRow, TopologyRow, WriteError,
+};
+use sim_contract::{LoadHeader, Outcome, ParameterValues, ParticleState, Reason};
+use sim_solver::{Applied, EnergyMeter, Scene, Solver};
+
+use super::frozen::{FrozenParticles, FrozenTracker};
+use super::job::Start;
+use super::solver_rows::{colliders_row, forces_row, new_tears_row, step_row};
+
+/// Returns the memory that the recording of a simulation takes beside its solver, in bytes: for another solver of the scene as
+/// loaded, and for rows and their encoded messages.
+pub fn recording_bytes(scene: &Scene) -> u64 {
+    scene.memory_bytes() + 3 * scene.published_bytes()
+}
+
+/// Starts the recording of a simulation.
+///
+/// # Errors
+/// If it cannot be written.
+pub fn begin_log<W: Write>(
+    out: W,
+    options: LogOptions,
+    run: &RunDescription,
+    scene: &Scene,
+) -> Result<LogWriter<W>, WriteError> {
+    let mut log = LogWriter::create(out, options, run, scene.to_toml().as_bytes(), 0)?;
+    log.describe_colliders(&SceneColliders::new(scene))?;
+    Ok(log)
+}
+
+/// Completes the recording of a simulation.
+///
+/// # Errors
+/// If it cannot be written.
+pub fn finish_log<W: Write>(log: LogWriter<W>, stop_reason: &str) -> Result<W, WriteError> {
+    let (stop_reason, counts) = (stop_reason.to_owned(), *log.counts());
+    let mut closing = Closing { stop_reason, counts, ..Closing::default() };
+    closing.counts.set_received_to_written();
+    log.finish(&closing)
+}
+
+/// Writes a simulation step by step. Every call gets the same log.
+#[derive(Debug)]
+pub(super) struct StateWriter {
+    run: RunDescription,
+    /// The outcomes of the next step.
+    outcomes: Vec<OutcomeRow>,
+    /// The next step has a keyframe, also if it is no whole simulated second.
+    is_keyframe_due: bool,
+    outcome_count: u64,
+    first_step: u64,
+    /// The colliders of the last step.
+    colliders: Option<Vec<ColliderRow>>,
+    /// The parameters of the last step.
+    parameters: Option<ParameterValues>,
+    frozen: FrozenTracker,
+    /// None unless the recording has the energy of each state.
+    meter: Option<EnergyMeter>,
+}
+
+impl StateWriter {
+    /// Starts with the load. `solver` has the first state.
+    pub(super) fn new<W: Write>(
+        log: &mut LogWriter<W>,
+        run: &RunDescription,
+        scene: &Scene,
+        start: Start,
+        solver: &Solver,
+    ) -> Result<Self, WriteError> {
+        let header = LoadHeader { method: run.method, ..LoadHeader::default() };
+        // A command may have changed the constraints of the state.
+        let loaded = Solver::new(scene);
+        let topology = TopologyRow::of_solver(&header, &loaded);
+        let topology = TopologyRow { torn: solver.torn().to_vec(), ..topology };
+        log.write(&Message::Topology(topology), 0)?;
+        log.write(&Message::Surface(SurfaceRow::of_solver(&header, solver)), 0)?;
+        Ok(Self {
+            run: run.clone(),
+            outcomes: Vec::new(),
+            is_keyframe_due: true,
+            outcome_count: start.outcome_count,
+            first_step: start.step,
+            // A scene without colliders has no row.
+            colliders: Some(Vec::new()),
+            parameters: None,
+            frozen: FrozenTracker::default(),
+            meter: log.selection().has_energy.then(|| EnergyMeter::of(solver)),
+        })
+    }
+
+    /// Adds the outcome of a command at the boundary before the next step.
+    pub(super) fn add_outcome(&mut self, outcome: &Outcome, result: Result<Applied, Reason>) {
+        self.is_keyframe_due |= result.is_ok_and(|applied| applied != Applied::Target);
+        self.outcomes.push(OutcomeRow::from(outcome));
+    }
+
+    /// Writes all messages of a step. The snapshot is the last one.
+    pub(super) fn write_state<W: Write>(
+        &mut self,
+        log: &mut LogWriter<W>,
+        solver: &Solver,
+        step: u64,
+    ) -> Result<(), WriteError> {
+        let time_ns = self.run.time_of_step_ns(step);
+        let is_second = step.is_multiple_of(u64::from(self.run.rate_hz));
+        // By simulated time, not by wall-clock time, so that equal inputs give equal files.
+        if is_second && step > 0 {
+            log.flush()?;
+        }
+        let is_in_place = self.outcomes.iter().any(|row| row.replaces_state() && row.is_applied());
+        for row in self.outcomes.drain(..) {
+            self.outcome_count += 1;
+            log.write(&Message::Outcome(row), time_ns)?;
+        }
+        self.write_colliders(log, solver, step)?;
+        if let Some(row) = new_tears_row(solver, step, is_in_place) {
+            log.write(&Message::Tears(row), time_ns)?;
+        }
+        self.write_parameters(log, solver, step)?;
+        // No step has led to the first state.
+        if step > self.first_step
+            && let Some(row) = forces_row(solver, step)
+        {
+            log.write(&Message::Forces(row), time_ns)?;
+        }
+        if std::mem::take(&mut self.is_keyframe_due) || is_second {
+            let bytes = solver.keyframe().encode();
+            log.write(&Message::Keyframe { step, bytes }, time_ns)?;
+        }
+        self.write_snapshot(log, solver, step)
+    }
+
+    /// Writes the colliders in each step while one moves, and after each change. The step after a
+    /// motion is a change too, because the velocity returns to 0.
+    fn write_colliders<W: Write>(
+        &mut self,
+        log: &mut LogWriter<W>,
+        solver: &Solver,
+        step: u64,
+    ) -> Result<(), WriteError> {
+        let row = colliders_row(solver, step);
+        if !changes(&mut self.colliders, &row.colliders) && !solver.has_moving_colliders() {
+            return Ok(());
+        }
+        log.write(&Message::Colliders(row), self.run.time_of_step_ns(step))
+    }
+
+    /// Writes the parameters at the start and after each change.
+    fn write_parameters<W: Write>(
+        &mut self,
+        log: &mut LogWriter<W>,
+        solver: &Solver,
+        step: u64,
+    ) -> Result<(), WriteError> {
+        let values = solver.parameter_values();
+        if !changes(&mut self.parameters, &values) {
+            return Ok(());
+        }
+        let row = ParametersRow { step, values };
+        log.write(&Message::Parameters(row), self.run.time_of_step_ns(step))
+    }
+
+    fn write_snapshot<W: Write>(
+        &mut self,
+        log: &mut LogWriter<W>,
+        solver: &Solver,
+        step: u64,
+    ) -> Result<(), WriteError> {
+        let time_ns = self.run.time_of_step_ns(step);
+        let particles: &[ParticleState] = bytemuck::cast_slice(solver.particles());
+        for row in self.frozen.new_events(step, FrozenParticles::find(particles)) {
+            log.write(&Message::Event(row), time_ns)?;
+        }
+        let energy = self.meter.as_mut().map(|meter| meter.measure_solver(solver).into());
+        let row = StepRow { outcome_count: self.outcome_count, energy, ..step_row(solver, step) };
+        log.write(&Message::Step(row), time_ns)?;
+        let mut buffer = log.take_spare().unwrap_or_default();
+        buffer.copy_from(particles);
+        log.write_particles(step, buffer, time_ns)
+    }
+}
+
+/// Returns `true` if a value differs from the last one, which it replaces.
+fn changes<T: Clone + PartialEq>(last: &mut Option<T>, now: &T) -> bool {
+    let is_changed = last.as_ref() != Some(now);
+    if is_changed {
+        *last = Some(now.clone());
+    }
+    is_changed
+}

@@ -1,0 +1,188 @@
+//! The tears, colliders, parameters, forces and keyframes of a step, compared with the re-simulation.
+
+use crate::log::{
+    ColliderDetails, ColliderRow, CollidersRow, ForcesRow, Frame, Message, ParametersRow, TearsRow,
+    Topic,
+};
+use sim_contract::{
+    ConstraintKind, ForceKind, ForceRow, Parameter, ParameterValue, ParameterValues, Setting,
+};
+use sim_solver::{Keyframe, Solver};
+
+use crate::simulation::solver_rows::{colliders_row, forces_row, newest_tears_row};
+
+/// Compares a row with the solver after its step. Returns a description of the first difference.
+pub(super) fn compare_row(row: &Message, solver: &Solver) -> Option<String> {
+    match row {
+        Message::Tears(row) => compare_tears(row, solver),
+        Message::Colliders(row) => compare_colliders(row, solver),
+        Message::Parameters(row) => compare_parameters(row, solver),
+        Message::Forces(row) => compare_forces(row, solver),
+        Message::Keyframe { bytes, .. } => compare_keyframe(bytes, solver),
+        Message::Outcome(row) => {
+            Some(format!("/outcomes: outcome {} is misplaced, or there twice", row.index))
+        }
+        _ => None,
+    }
+}
+
+/// Returns the newest rows up to the first snapshot, which describe it. Its tears are part of the state, and its forces
+/// depend on the step that led to it.
+pub(super) fn newest_rows(first: &Frame) -> Vec<Message> {
+    let newest = |topic| first.updates.iter().rfind(|update| update.topic() == topic);
+    let is_own = |keyframe: &&Message| keyframe.step() == first.row.step;
+    let keyframe = newest(Topic::Keyframe).filter(is_own);
+    let rows = [Topic::Colliders, Topic::Parameters].map(newest);
+    rows.into_iter().chain([keyframe]).flatten().cloned().collect()
+}
+
+/// Replaces the velocities of colliders by those of a restored solver, which does not know the motion
+/// that led to its state.
+pub(super) fn ignore_collider_velocities(rows: &mut [Message], solver: &Solver) {
+    for row in rows {
+        let Message::Colliders(row) = row else { continue };
+        let simulated = colliders_row(solver, row.step).colliders;
+        for (recorded, simulated) in row.colliders.iter_mut().zip(simulated) {
+            recorded.velocity = simulated.velocity;
+            recorded.angular_velocity = simulated.angular_velocity;
+        }
+    }
+}
+
+fn compare_keyframe(bytes: &[u8], solver: &Solver) -> Option<String> {
+    let recorded = match Keyframe::decode(bytes) {
+        Ok(recorded) => recorded,
+        Err(error) => return Some(format!("its message on /keyframe is damaged: {error}")),
+    };
+    if recorded.encode() != bytes {
+        return Some("its message on /keyframe has bytes that a solver does not write".to_owned());
+    }
+    let mut simulated = solver.keyframe();
+    // The solver does not know whether the node was paused.
+    simulated.paused = recorded.paused;
+    // Their bytes, because a number that is not finite differs from itself.
+    (simulated.encode() != bytes).then(|| {
+        "its message on /keyframe has another state: the masses, grabs, parameters, torn constraints, or moved \
+         anchors or colliders differ"
+            .to_owned()
+    })
+}
+
+/// Compares the newest tears. A recorder that missed a list writes all tears since the previous one
+/// in one row: those of this step, and the newest of the steps before.
+fn compare_tears(recorded: &TearsRow, solver: &Solver) -> Option<String> {
+    let count = recorded.constraints.len().max(solver.new_torn_count());
+    let simulated = newest_tears_row(solver, recorded.step, count);
+    let place = (0..count).find(|place| is_different(recorded, &simulated, *place))?;
+    let [recorded, simulated] = [recorded, &simulated].map(|row| tear_text(row, place));
+    Some(format!("its tears in /tears: recorded {recorded}, simulated {simulated}"))
+}
+
+/// Compares one tear. An unknown recorded cause equals any cause.
+fn is_different(recorded: &TearsRow, simulated: &TearsRow, place: usize) -> bool {
+    let cause = |row: &TearsRow| row.causes.get(place).filter(|name| *name != "unknown").cloned();
+    recorded.constraints.get(place) != simulated.constraints.get(place)
+        || cause(recorded).is_some_and(|name| Some(name) != cause(simulated))
+}
+
+/// Returns text such as "constraint 7 (cut)".
+fn tear_text(row: &TearsRow, place: usize) -> String {
+    let Some(constraint) = row.constraints.get(place) else { return "none".to_owned() };
+    let cause = row.causes.get(place).map_or("unknown", String::as_str);
+    format!("constraint {constraint} ({cause})")
+}
+
+/// Compares all parameters except the time scale, which belongs to the node.
+fn compare_parameters(recorded: &ParametersRow, solver: &Solver) -> Option<String> {
+    let time_scale = recorded.values.time_scale;
+    let simulated = ParameterValues { time_scale, ..solver.parameter_values() };
+    let (old, new) = (recorded.values.settings(), simulated.settings());
+    let differs =
+        |place: &usize| old.get(*place).map(setting_bits) != new.get(*place).map(setting_bits);
+    let place = (0..old.len().max(new.len())).find(differs)?;
+    let setting = old.get(place).or_else(|| new.get(place))?;
+    let block = setting.block.map_or_else(String::new, |block| format!(" of block {block}"));
+    let value = |settings: &[Setting]| {
+        settings.get(place).map_or_else(|| "none".to_owned(), |one| value_text(one.value))
+    };
+    let (name, old, new) = (setting.parameter.name(), value(&old), value(&new));
+    Some(format!("/parameters: parameter {name}{block}: recorded {old}, simulated {new}"))
+}
+
+/// The parameter, the constraints to which it applies, and the bits of its value.
+fn setting_bits(
+    setting: &Setting,
+) -> (Parameter, Option<ConstraintKind>, Option<u32>, [Option<u32>; 3]) {
+    let Setting { parameter, constraint_kind, block, value } = *setting;
+    let bits = match value {
+        ParameterValue::Number(number) => [Some(number.to_bits()), None, None],
+        ParameterValue::Vector(vector) => vector.map(|axis| Some(axis.to_bits())),
+        ParameterValue::Off => [None; 3],
+    };
+    (parameter, constraint_kind, block, bits)
+}
+
+fn value_text(value: ParameterValue) -> String {
+    match value {
+        ParameterValue::Number(number) => number.to_string(),
+        ParameterValue::Vector(vector) => format!("{vector:?}"),
+        ParameterValue::Off => "off".to_owned(),
+    }
+}
+
+/// Compares the impulses of a step.
+fn compare_forces(recorded: &ForcesRow, solver: &Solver) -> Option<String> {
+    if let Some(problem) = recorded.problem() {
+        return Some(format!("its message on /forces: {problem}"));
+    }
+    let simulated = forces_row(solver, recorded.step)?;
+    let (old, new) = (recorded.rows(), simulated.rows());
+    let differs = |place: &usize| {
+        let [old, new] = [old.get(*place), new.get(*place)];
+        old.map(bytemuck::bytes_of) != new.map(bytemuck::bytes_of)
+    };
+    let place = (0..old.len().max(new.len())).find(differs)?;
+    let [recorded, simulated] = [old.get(place), new.get(place)].map(force_text);
+    Some(format!("its forces in /forces: recorded {recorded}, simulated {simulated}"))
+}
+
+/// Returns text such as "particle 13 [0.0, -0.5, 0.0] N s".
+fn force_text(row: Option<&ForceRow>) -> String {
+    let Some(row) = row else { return "none".to_owned() };
+    let kind = row.kind().map_or("unknown", ForceKind::name);
+    let ForceRow { index, impulse, angular_impulse, contacts, .. } = *row;
+    match row.kind() {
+        Some(ForceKind::Collider) => {
+            format!(
+                "{kind} {index} {impulse:?} N s, {angular_impulse:?} N m s, {contacts} contacts"
+            )
+        }
+        Some(ForceKind::Anchor) => {
+            format!("{kind} {index} {impulse:?} N s, {angular_impulse:?} N m s")
+        }
+        _ => format!("{kind} {index} {impulse:?} N s"),
+    }
+}
+
+fn compare_colliders(recorded: &CollidersRow, solver: &Solver) -> Option<String> {
+    let simulated = colliders_row(solver, recorded.step);
+    let (old, new) = (&recorded.colliders, &simulated.colliders);
+    if old.len() != new.len() {
+        return Some(format!(
+            "/colliders: recorded {} colliders, simulated {}",
+            old.len(),
+            new.len()
+        ));
+    }
+    let place = old.iter().zip(new).position(|(old, new)| without_details(old) != *new)?;
+    Some(format!(
+        "/colliders: collider {place}: recorded {:?}, simulated {:?}",
+        without_details(&old[place]),
+        new[place]
+    ))
+}
+
+/// Returns the properties that a solver has. The others are compared with the scene.
+fn without_details(recorded: &ColliderRow) -> ColliderRow {
+    ColliderRow { details: ColliderDetails::default(), ..recorded.clone() }
+}

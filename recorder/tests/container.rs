@@ -1,6 +1,0 @@
-//! The check and the repair of whole files, on small recordings in memory.
-
-mod check;
-mod format_4;
-mod recording;
-mod repair;
