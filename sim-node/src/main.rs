@@ -29,7 +29,7 @@ fn main() -> Exit {
         Some(Verb::Run(run)) => run::run(&run),
         Some(Verb::Scenes(list)) => scenes::list(&list),
         Some(Verb::Show(show)) => scenes::show(&show),
-        Some(Verb::Check(check)) => scenes::check(&check),
+        Some(Verb::Check(check)) => return exit::from_result(scenes::check(&check)),
         Some(Verb::Import(mesh)) => scenes::import::import(&mesh),
         Some(Verb::Ctl(ctl)) => return exit::from_result(ctl::ctl(&ctl)),
         Some(Verb::Ps(list)) => domain::ps::ps(&list),

@@ -7,6 +7,7 @@ use sim_solver::builtin;
 use sim_solver::scene::SceneCounts;
 
 use crate::args::{CheckArgs, ScenesArgs, ShowArgs};
+use crate::exit::Exit;
 use crate::table::{Align, Table};
 use crate::{output, scene_source};
 
@@ -74,9 +75,15 @@ struct CheckedScene {
     warnings: Vec<String>,
 }
 
-/// Checks a scene: an error fails, warnings are printed.
-pub(crate) fn check(args: &CheckArgs) -> anyhow::Result<()> {
-    let scene = scene_source::load(&args.scene)?;
+/// Checks a scene: errors fail, and all of them are printed, like warnings.
+pub(crate) fn check(args: &CheckArgs) -> anyhow::Result<Exit> {
+    let scene = match scene_source::load(&args.scene) {
+        Ok(scene) => scene,
+        Err(error) => {
+            error.list().lines().for_each(|line| output::note(&format!("error: {line}")));
+            return Ok(Exit::Failed);
+        }
+    };
     let checked = CheckedScene {
         counts: scene.counts(),
         rate_hz: scene.solver.rate_hz,
@@ -86,7 +93,7 @@ pub(crate) fn check(args: &CheckArgs) -> anyhow::Result<()> {
         name: scene.name,
     };
     if args.json {
-        return output::json(&checked);
+        return output::json(&checked).map(|()| Exit::Done);
     }
     let CheckedScene { name, counts, rate_hz, substeps, iterations, warnings } = checked;
     let bends = if counts.bends > 0 { format!(" {} bends,", counts.bends) } else { String::new() };
@@ -98,5 +105,5 @@ pub(crate) fn check(args: &CheckArgs) -> anyhow::Result<()> {
     for warning in warnings {
         output::line(&format!("warning: {warning}"))?;
     }
-    Ok(())
+    Ok(Exit::Done)
 }

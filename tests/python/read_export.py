@@ -6,6 +6,7 @@ The recording is read with the stock MCAP reader. Its particles are compared as 
 counts.
 """
 
+import base64
 import csv
 import json
 import sys
@@ -17,6 +18,22 @@ import numpy as np
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
+
+
+def index_lists(text):
+    """The lists of indices of a printed scene: base64 of varints, of each list its length and its indices."""
+    numbers, number, shift = [], 0, 0
+    for byte in base64.b64decode(text, validate=True):
+        number |= (byte & 0x7F) << shift
+        shift += 7
+        if byte < 0x80:
+            numbers.append(number)
+            number, shift = 0, 0
+    lists = []
+    while numbers:
+        lists.append(numbers[1 : numbers[0] + 1])
+        del numbers[: numbers[0] + 1]
+    return lists
 
 
 class Recording:
@@ -44,6 +61,7 @@ class Recording:
         # A scene of one mesh has its faces, every other one the triangles.
         generated = tomllib.loads(scene.decode())["generate"]
         self.mesh = generated[0] if len(generated) == 1 and "faces" in generated[0] else {}
+        self.mesh |= {key: index_lists(self.mesh[key]) for key in ("faces", "face_uvs") if key in self.mesh}
         self.faces = self.mesh.get("faces", self.triangles.tolist())
 
     def index(self, step):

@@ -77,7 +77,7 @@ pub(crate) fn lockstep_error(error: &LockstepError) -> PyErr {
 }
 
 pub(crate) fn load_error(error: &LoadError) -> PyErr {
-    SceneError::new_err(error.to_string())
+    SceneError::new_err(error.list())
 }
 
 pub(crate) fn recording_error(path: &Path, error: &dyn StdError) -> PyErr {

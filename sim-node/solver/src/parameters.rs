@@ -12,8 +12,8 @@ use sim_types::{
 use crate::checks::{Context, is_near};
 use crate::constraints::bends::Bend;
 use crate::scene::definition::Scene;
-use crate::scene::definition::limits::Limits;
-use crate::scene::definition::wind::Wind;
+use crate::scene::definition::element::Limits;
+use crate::scene::definition::settings::Wind;
 use block_bending::BlockBending;
 use surfaces::Surfaces;
 

@@ -3,32 +3,35 @@
 //! [`Scene`] is the complete scene with every default filled in. `Model` is its expansion: every
 //! particle, constraint and triangle, including the generated ones.
 //!
-//! The folders, from the bottom: `definition` has the values, `generate` the shapes that expand to
-//! many particles, `read` the way from TOML text to a checked scene.
+//! From the bottom: `document` parses a text into values with their places, `fields` walks the keys of a table to read or to
+//! print it, `definition` and `generate` have the tables, each with its keys, and `read` checks what concerns several tables.
 
 pub(crate) mod definition;
+mod document;
 mod error;
+mod fields;
 mod generate;
+mod lists;
 mod memory;
 mod mesh;
 pub(crate) mod model;
 mod poses;
 mod read;
+mod solids;
 mod source;
 mod warnings;
 
 pub use definition::anchor::{SceneAnchor, Waypoint};
-pub use definition::bending::{BendParticles, MeshBending, Rigidity, SceneBend, SheetBending};
+pub use definition::bending::{MeshBending, Rigidity, SheetBending};
 pub use definition::collider::{ColliderGeometry, ColliderMesh, ColliderMeshes, SceneCollider};
-pub use definition::element::{SceneConstraint, SceneParticle};
-pub use definition::limits::Limits;
-pub use definition::settings::{
-    ConstraintOrder, PASSES_MAX, RATE_HZ_MAX, SolverSettings, TETHERS_MAX, Up,
+pub use definition::element::{
+    BendParticles, KindSoftness, Limits, SceneBend, SceneConstraint, SceneParticle, Softness,
 };
-pub use definition::softness::{KindSoftness, Softness, SoftnessValues};
-pub use definition::wind::Wind;
+pub use definition::settings::{
+    ConstraintOrder, PASSES_MAX, RATE_HZ_MAX, SolverSettings, TETHERS_MAX, Up, Wind,
+};
 pub use definition::{SCENE_VERSION, Scene, SceneCounts};
-pub use error::SceneError;
+pub use error::{SceneError, SceneProblem};
 pub use generate::bridge::Bridge;
 pub use generate::cloth::{Cloth, Diagonals};
 pub use generate::obj::Obj;

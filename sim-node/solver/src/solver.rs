@@ -20,7 +20,7 @@ use crate::kernels::Kernels;
 use crate::parameters::Parameters;
 use crate::scene::definition::Scene;
 use crate::scene::definition::anchor::SceneAnchor;
-use crate::scene::definition::contact::ContactMode;
+use crate::scene::definition::settings::ContactMode;
 use crate::scene::definition::settings::{SolverSettings, substep_length};
 use crate::scene::model::Model;
 use crate::scene::{ThreadedScene, check_memory, thread_bytes};

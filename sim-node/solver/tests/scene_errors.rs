@@ -10,7 +10,7 @@ const CASES: &str = include_str!("scenes/errors.txt");
 fn error(text: &str) -> String {
     match Scene::from_toml(text, "f.toml") {
         Ok(_) => "accepted".to_owned(),
-        Err(error) => error.to_string(),
+        Err(error) => error.list(),
     }
 }
 
@@ -18,6 +18,7 @@ fn error(text: &str) -> String {
 fn cases() -> impl Iterator<Item = (String, String)> {
     CASES.split("\n\n").skip(1).map(|block| {
         let (text, expected) = block.trim_end().split_once("\n=> ").unwrap();
+        let expected = expected.replace("\n=> ", "\nf.toml:");
         (format!("version = 1\n{text}"), format!("f.toml:{expected}"))
     })
 }
@@ -87,8 +88,61 @@ fn no_error_shows_an_internal_name_or_says_a_thing_twice() {
         {
             assert!(!error.contains(internal), "{internal}: {error}");
         }
-        for word in ["f.toml", "(allowed"] {
-            assert!(error.matches(word).count() <= 1, "{word}: {error}");
+        for line in error.lines() {
+            for word in ["f.toml", "(allowed"] {
+                assert_eq!(line.matches(word).count(), 1, "{word}: {error}");
+            }
         }
+    }
+}
+
+#[test]
+fn the_text_of_an_error_is_its_first_problem_and_the_number_of_the_others() {
+    let text = "version = 1\nup = \"q\"\nunit = 3\n[solver]\nrate_hz = 0\n";
+    let error = Scene::from_toml(text, "f.toml").unwrap_err();
+    let expected = "f.toml:2: up: \"q\" is unknown (allowed: y, -y, z) (and 2 more errors; `sim-node check` lists all)";
+    assert_eq!(error.to_string(), expected);
+    assert_eq!(error.list().lines().count(), 3);
+}
+
+#[test]
+fn a_list_of_errors_ends_after_a_thousand() {
+    let list = error(&format!("version = 1\n{}", "[[particle]]\nposition = 1\n".repeat(5000)));
+    let lines: Vec<_> = list.lines().collect();
+    assert_eq!((lines.len(), lines[1000]), (1001, "f.toml: and 4000 more errors"));
+    for (index, line) in lines[..1000].iter().enumerate() {
+        let start = format!("f.toml:{}: particle[{index}].position: ", 3 + 2 * index);
+        assert!(line.starts_with(&start), "{line}");
+    }
+}
+
+#[test]
+fn a_misspelt_method_has_no_consequences() {
+    let text = "[solver]\nmethod = \"pdb\"\n[[generate]]\nshape = \"ragdoll\"\nheight = 1\nstiffness = { shear = 0.5 }\n";
+    let expected =
+        "f.toml:3: solver.method: \"pdb\" is unknown (did you mean 'pbd'?) (allowed: xpbd, pbd)";
+    assert_eq!(error(&format!("version = 1\n{text}")), expected);
+}
+
+#[test]
+fn a_list_in_base64_is_checked_like_another() {
+    let with = |vertices: &str, faces: &str| {
+        error(&format!(
+            "version = 1\n[[generate]]\nshape = \"obj\"\nvertices = \"{vertices}\"\nfaces = \"{faces}\"\n"
+        ))
+    };
+    // Three points, the first of them at infinity.
+    let far = "AACAfwAAAAAAAAAAAAAAAAAAgD8AAAAAAAAAAAAAAAAAAIA/";
+    let near = "AACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAAAAAAAAAAAAIA/";
+    assert_eq!(with(near, "AwABAg=="), "accepted");
+    for (vertices, faces, expected) in [
+        (far, "AwABAg==", "4: generate[0].vertices: inf is out of range (allowed: -1e7 to 1e7;"),
+        ("AACAfw==", "AwABAg==", "4: generate[0].vertices: is not base64 of whole elements"),
+        (near, "AwABAw==", "5: generate[0].faces: face 0 is [0, 1, 3] (allowed: 3 or more"),
+        (near, "BAABAg==", "5: generate[0].faces: is not base64 of whole elements"),
+        (near, "Aw", "5: generate[0].faces: is not base64 of whole elements"),
+    ] {
+        let error = with(vertices, faces);
+        assert!(error.contains(expected), "{error}");
     }
 }

@@ -70,7 +70,7 @@ fn read(text: &str) -> Result<Scene, SceneError> {
 
 /// Returns the problem of a text that is refused.
 fn problem(text: &str) -> String {
-    read(text).unwrap_err().problem
+    read(text).unwrap_err().first().problem.clone()
 }
 
 /// Replaces the `@` of a text by as many copies of a part as the largest text allows. The `#` of a copy
@@ -113,7 +113,7 @@ fn the_largest_complete_texts_with_many_tables_are_read() {
         // Room for the defaults of the scene in the complete text.
         let text = longest(&format!("#{}\n{text}", "-".repeat(1000)), part);
         let size_bytes = read(&text).unwrap().to_toml().len();
-        assert!(size_bytes > SCENE_SIZE_BYTES_MAX * 9 / 10, "{size_bytes}: {part}");
+        assert!(size_bytes > SCENE_SIZE_BYTES_MAX * 8 / 10, "{size_bytes}: {part}");
     }
 }
 
@@ -138,7 +138,7 @@ fn the_most_particles_are_read_beside_the_longest_complete_text() {
         compliance = 0.0\n\n";
     assert_eq!(read(&longest(&sheet, constraint)).err(), None);
     let problem = problem(&longest(&sheet, "[[constraint]]\nparticles=[0,1]\n"));
-    assert!(problem.contains("for its particles, explicit constraints"), "{problem}");
+    assert!(problem.contains(COMPLETE_TEXT), "{problem}");
 }
 
 /// Many edges between few vertices: each has two faces, and so two bends.
@@ -251,9 +251,9 @@ fn short_texts_of_long_complete_texts_are_refused() {
     let faces = MESH.replace("VERTICES", "[0,0,0],[1,0,0],[0,1,0]");
     for (text, part, expected) in [
         (PAIR, "[[particle]]\nposition=[0,0,0]\n", COMPLETE_TEXT),
-        (vertices, "[0,0,0],", COMPLETE_TEXT),
-        (&faces, "[0,1,2],", COMPLETE_TEXT),
-        (PAIR, "[[generate]]\nshape=\"ragdoll\"\nheight=1\n", TOO_MUCH),
+        (vertices, "[0,0,0],", TOO_MUCH),
+        (&faces, "[0,1,2],", TOO_MUCH),
+        (PAIR, "[[generate]]\nshape=\"ragdoll\"\nheight=1\n", COMPLETE_TEXT),
         (&path, "{time=#},", TOO_MUCH),
     ] {
         let problem = problem(&longest(text, part));
@@ -267,14 +267,14 @@ fn empty_tables_and_elements_are_refused() {
     let particles = ROPE.replace('@', "[[anchor]]\nparticles = [@]\n");
     let faces = MESH.replace("VERTICES", "[0,0,0],[1,0,0],[0,1,0]");
     for (text, part, expected) in [
-        ("@", "[[particle]]\n", TOO_MUCH),
-        ("@", "[[generate]]\n", TOO_MUCH),
-        (&path, "[[anchor.path]]\n", TOO_MUCH),
+        ("@", "[[particle]]\n", "is missing"),
+        ("@", "[[generate]]\n", "is missing"),
+        (&path, "[[anchor.path]]\n", "is missing"),
         (&faces, "[],", TOO_MUCH),
         ("[[generate]]\nlinks=[@]", "\"\",", TOO_MUCH),
         ("generate=[@]\n", "{},", TOO_MUCH),
         ("particle=[@]\n", "{position=[0,0,0]},", TOO_MUCH),
-        (&particles, "0,", "twice"),
+        (&particles, "0,", TOO_MUCH),
     ] {
         let problem = problem(&longest(text, part));
         assert!(problem.contains(expected), "{part}: {problem}");
@@ -284,25 +284,25 @@ fn empty_tables_and_elements_are_refused() {
 #[test]
 fn texts_that_are_not_scenes_are_refused() {
     for (text, part, expected) in [
-        ("@", "a.b.c.d.e=1\n", TOO_MUCH),
+        ("@", "a.b.c.d.e=1\n", "occurs twice"),
         ("[[generate]]\n@", "a.a.", TOO_MUCH),
-        ("@", "[a.b.c.d]\n", TOO_MUCH),
+        ("@", "[a.b.c.d]\n", "occurs twice"),
         ("a=[@]", "[],", TOO_MUCH),
         ("a=[@]", "[[[[1]]]],", TOO_MUCH),
         ("x = 1 [\n@", "[[generate]]\n", TOO_MUCH),
         ("[a\n@", "[[generate]]\n", TOO_MUCH),
-        ("[[anchor]]\n[[particle]]\n@", "[[anchor.path]]\n", TOO_MUCH),
+        ("[[anchor]]\n[[particle]]\n@", "[[anchor.path]]\n", "is missing"),
         ("a=@", "[", TOO_MUCH),
         ("a=@", "{a=", TOO_MUCH),
         ("@", "=", TOO_MUCH),
-        ("@", "\n", TOO_MUCH),
-        ("@", "[[a]]\n", "unknown key"),
-        ("[[generate]]\n@", "pinned=[0,0]\n", TOO_MUCH),
-        ("[[generate]]\nvertices=[@", "0,", "unclosed array"),
-        ("[[generate]]\nvertices=[@]", "[[[[0]]]],", "is a list"),
+        ("@", "\n", "is missing"),
+        ("@", "[[a]]\n", TOO_MUCH),
+        ("[[generate]]\n@", "pinned=[0,0]\n", "occurs twice"),
+        ("[[generate]]\nvertices=[@", "0,", TOO_MUCH),
+        ("[[generate]]\nvertices=[@]", "[[[[0]]]],", TOO_MUCH),
         ("@", " ", "is missing"),
-        ("@", "\"", "key with no value"),
-        ("x=\"@\"", "\\n", "unknown key"),
+        ("@", "\"", "keys cannot be multi-line"),
+        ("x=\"@\"", "\\n", "is missing"),
     ] {
         let problem = problem(&longest(text, part));
         assert!(problem.contains(expected), "{part}: {problem}");

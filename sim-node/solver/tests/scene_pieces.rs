@@ -24,7 +24,7 @@ fn read(text: &str) -> Result<Scene, SceneError> {
 }
 
 fn error(text: &str) -> String {
-    read(text).unwrap_err().to_string()
+    read(text).unwrap_err().list()
 }
 
 /// Marks each header as the start of a piece.
@@ -185,7 +185,7 @@ fn errors_in_divided_tables_count_the_elements_of_earlier_pieces() {
         ),
         (mesh("mass = 0.5", "pinned = []"), "pinned: occurs twice (allowed: once)"),
         (
-            anchor("path = [@ { time = 0 }, @ { time = 1 }, @ { at = 2 }]"),
+            anchor("path = [@ { time = 0 }, @ { time = 1 }, @ { time = 2, at = 2 }]"),
             "anchor[0].path[2].at: unknown key (allowed: time, translation, rotation)",
         ),
         (
@@ -193,7 +193,9 @@ fn errors_in_divided_tables_count_the_elements_of_earlier_pieces() {
             "anchor[0].path[2].time: 1 is not after 1 (allowed: ascending times)",
         ),
         (
-            anchor("@[[anchor.path]]\ntime = 0\n@[[anchor.path]]\n@[[anchor.path]]\ntime = []"),
+            anchor(
+                "@[[anchor.path]]\ntime = 0\n@[[anchor.path]]\ntime = 1\n@[[anchor.path]]\ntime = []",
+            ),
             "anchor[0].path[2].time: is a list (allowed: a number)",
         ),
         (
@@ -204,7 +206,7 @@ fn errors_in_divided_tables_count_the_elements_of_earlier_pieces() {
         ),
         (
             anchor(
-                "@[[anchor.path]]\ntime = 0\n@[[anchor.path]]\ntime = 1\n@[[generate]]\npath = 1",
+                "@[[anchor.path]]\ntime = 0\n@[[anchor.path]]\ntime = 1\n@[[generate]]\nshape = \"obj\"\npath = 1",
             ),
             "generate[1].path: is the number 1 (allowed: text in quotes)",
         ),

@@ -70,7 +70,7 @@ fn a_table_can_be_appended_to_the_complete_text_of_every_builtin_scene() {
         for table in &tables {
             let appended = Scene::from_toml(&format!("{text}{table}"), name);
             // Particles of the first anchor of such a scene have one already.
-            let problem = appended.err().map(|error| error.problem).unwrap_or_default();
+            let problem = appended.err().map(|error| error.list()).unwrap_or_default();
             assert!(problem.is_empty() || problem.contains("anchor"), "{name}: {problem}\n{table}");
         }
     }
@@ -219,6 +219,15 @@ fn a_scene_with_every_key_survives_the_round_trip_through_its_complete_text() {
     assert_eq!(scene.particles[0].mass.to_bits(), 0.3_f32.to_bits());
 }
 
+#[test]
+fn each_long_list_of_a_printed_scene_is_one_text() {
+    let text = Scene::from_toml(EVERY_KEY, "file.toml").unwrap().to_toml();
+    for key in ["vertices", "faces"] {
+        assert_eq!(text.matches(&format!("\n{key} = \"")).count(), 2, "{text}");
+        assert_eq!(text.matches(&format!("\n{key} = [")).count(), 0, "{text}");
+    }
+}
+
 /// Every shape that a scene of 2 dimensions may have, with its required keys.
 const PLANAR_SHAPES: [&str; 6] = [
     "shape = \"cloth\"\ncolumns = 3\nrows = 2\nspacing = 1\n",
@@ -248,7 +257,7 @@ fn a_web_out_of_the_plane_of_two_dimensions_is_refused() {
     assert!(web("[0, 0, -2]").is_ok());
     for normal in ["[1, 0, 0]", "[0.1, 0, 1]"] {
         let error = web(normal).unwrap_err();
-        assert!(error.problem.contains("in a scene of 2 dimensions"), "{error}");
+        assert!(error.first().problem.contains("in a scene of 2 dimensions"), "{error}");
     }
 }
 

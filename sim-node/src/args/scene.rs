@@ -28,7 +28,7 @@ pub(crate) struct ShowArgs {
 
 #[derive(Debug, ClapArgs)]
 #[command(
-    after_help = "An invalid scene exits with 1; the error names the file, line, field and allowed \
+    after_help = "An invalid scene exits with 1; each error names the file, line, field and allowed \
     values.\nWarnings do not change the exit code.\n\nExamples:\n  \
     sim-node check my.toml\n  \
     sim-node check --json my.toml"

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use anyhow::{Context, anyhow};
 use sim_contract::{Existing, PartFile, read_scene_file};
+use sim_solver::scene::SceneProblem;
 use sim_solver::{Scene, SceneError};
 
 use crate::args::ImportArgs;
@@ -72,7 +73,7 @@ fn scene_text(args: &ImportArgs) -> String {
 
 /// Names the option that is wrong, or the mesh.
 fn import_error(error: SceneError) -> anyhow::Error {
-    let SceneError { field, problem, .. } = &error;
+    let SceneProblem { field, problem, .. } = error.first();
     match field.rsplit('.').next() {
         Some("path") => anyhow!("{problem}"),
         Some("pinned") => anyhow!("--pin: {problem}"),

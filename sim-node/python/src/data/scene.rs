@@ -30,7 +30,7 @@ pub(crate) fn load_scene(source: &str) -> PyResult<Scene> {
 }
 
 pub(crate) fn scene_error(error: &SceneError) -> PyErr {
-    PythonSceneError::new_err(error.to_string())
+    PythonSceneError::new_err(error.list())
 }
 
 /// The constraints of a scene, as loaded.

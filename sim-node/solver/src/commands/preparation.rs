@@ -13,8 +13,8 @@ use crate::constraints::tethers::{TetherBasis, Tethers};
 use crate::contacts::pairs::ParticleContacts;
 use crate::kernels::Kernels;
 use crate::parameters::Parameters;
-use crate::scene::definition::contact::ContactMode;
 use crate::scene::definition::settings::ConstraintOrder;
+use crate::scene::definition::settings::ContactMode;
 use crate::scene::model::Model;
 use crate::store::{ParticleStore, SceneFields};
 

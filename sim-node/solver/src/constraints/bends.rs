@@ -6,7 +6,6 @@ pub(crate) mod hinge;
 pub(crate) mod projection;
 
 use glam::Vec3;
-use serde::Serialize;
 
 /// A bend of three or four particles.
 ///
@@ -75,8 +74,7 @@ impl BendShape {
 }
 
 /// Shape in which hinges are at rest.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RestShape {
     /// Both triangles in a plane.
     Flat,

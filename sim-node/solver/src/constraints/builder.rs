@@ -10,7 +10,7 @@ use super::parameters::{ConstraintParameters, LimitLengths, PassSoftness};
 use super::projection::TearMark;
 use super::separation::RestLength;
 use crate::parameters::Parameters;
-use crate::scene::definition::limits::Limits;
+use crate::scene::definition::element::Limits;
 use crate::scene::model::Model;
 
 /// Builds the parameters of each constraint.

@@ -7,7 +7,7 @@ use std::collections::BinaryHeap;
 use sim_types::{ConstraintKind, ParticleFlags};
 
 use crate::parameters::Parameters;
-use crate::scene::definition::softness::Softness;
+use crate::scene::definition::element::Softness;
 use crate::scene::model::Model;
 use crate::state::particles::Particles;
 use crate::state::tear::Torn;

@@ -34,7 +34,7 @@ use tile_tree::{Query, TileTree, search_order};
 
 use crate::kernels::Kernels;
 use crate::kernels::lanes::PackedParticle;
-use crate::scene::definition::contact::ContactMode;
+use crate::scene::definition::settings::ContactMode;
 use crate::scene::model::Model;
 use crate::state::tear::Torn;
 use crate::step::substep::Substep;

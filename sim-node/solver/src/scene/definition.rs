@@ -3,36 +3,30 @@
 pub(crate) mod anchor;
 pub(crate) mod bending;
 pub(crate) mod collider;
-pub(crate) mod contact;
-pub(crate) mod decimal;
 pub(crate) mod element;
-pub(crate) mod limits;
 pub(crate) mod settings;
-pub(crate) mod softness;
-pub(crate) mod wind;
 
 use std::ops::Range;
 
 use serde::Serialize;
-use sim_types::STEP_WORK_MAX;
+use sim_types::{ELEMENTS_MAX, ParameterValues, STEP_WORK_MAX};
 
+use super::fields::{At, Fields, SceneTable, print, printed};
+use super::generate::rope::Rope;
 use super::generate::{Generator, Shape};
 use super::mesh::details::FaceDetails;
 use super::model::{Model, ModelSize, Positions};
 use crate::checks::StepSize;
 use anchor::SceneAnchor;
-use bending::SceneBend;
-use collider::{ColliderMeshes, SceneCollider};
-use contact::ContactSettings;
-use element::{SceneConstraint, SceneParticle};
-use settings::{PASSES_MAX, RATE_HZ_MAX, SolverSettings, Up};
-use wind::Wind;
+use collider::{ColliderGeometry, ColliderMeshes, SceneCollider};
+use element::{SceneBend, SceneConstraint, SceneParticle};
+use settings::{ContactSettings, PASSES_MAX, RATE_HZ_MAX, SolverSettings, Up, Wind};
 
 /// Version of the scene format.
 pub const SCENE_VERSION: u32 = 1;
 
 /// A checked scene with every default filled in.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Scene {
     /// [`SCENE_VERSION`].
     pub version: u32,
@@ -47,47 +41,57 @@ pub struct Scene {
     /// Unit of length. It affects only labels.
     pub unit: String,
     /// Acceleration in unit/s^2.
-    #[serde(with = "decimal::vector")]
     pub gravity: [f32; 3],
     /// Rate, substeps and other settings of the solver.
     pub solver: SolverSettings,
     /// The air, if the scene has any.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub wind: Option<Wind>,
     /// Contacts of particles with each other.
     pub contact: ContactSettings,
     /// Explicit particles. They have the first indices.
-    #[serde(rename = "particle", skip_serializing_if = "Vec::is_empty")]
     pub particles: Vec<SceneParticle>,
     /// Explicit constraints. They have the first indices and may join generated particles.
-    #[serde(rename = "constraint", skip_serializing_if = "Vec::is_empty")]
     pub constraints: Vec<SceneConstraint>,
     /// Explicit bends. They have the first indices of bends.
-    #[serde(rename = "bend", skip_serializing_if = "Vec::is_empty")]
     pub bends: Vec<SceneBend>,
     /// Colliders, in the order in which they act.
-    #[serde(rename = "collider", skip_serializing_if = "Vec::is_empty")]
     pub colliders: Vec<SceneCollider>,
     /// Particles that follow moving frames.
-    #[serde(rename = "anchor", skip_serializing_if = "Vec::is_empty")]
     pub anchors: Vec<SceneAnchor>,
     /// Generators of further particles and constraints, in order.
-    #[serde(rename = "generate", skip_serializing_if = "Vec::is_empty")]
     pub generators: Vec<Generator>,
     /// Warnings from reading the scene and the files that it names, one sentence each.
-    #[serde(skip)]
     pub read_warnings: Vec<String>,
 }
 
 impl Scene {
+    /// Returns an empty scene with the defaults.
+    pub(super) fn blank(name: String) -> Self {
+        Self {
+            version: SCENE_VERSION,
+            name,
+            origin: [0.0; 3],
+            dimensions: 3,
+            up: Up::default(),
+            unit: "m".to_owned(),
+            gravity: ParameterValues::DEFAULT.gravity,
+            solver: SolverSettings::default(),
+            wind: None,
+            contact: ContactSettings::default(),
+            particles: Vec::new(),
+            generators: Vec::new(),
+            constraints: Vec::new(),
+            bends: Vec::new(),
+            anchors: Vec::new(),
+            colliders: Vec::new(),
+            read_warnings: Vec::new(),
+        }
+    }
+
     /// Returns the complete scene as TOML, with every default written out. Reading this text gives
     /// an equal scene.
-    ///
-    /// # Panics
-    /// Never: every checked scene has a TOML form.
-    #[allow(clippy::expect_used, reason = "numbers, names and lists always have a TOML form")]
     pub fn to_toml(&self) -> String {
-        toml::to_string(self).expect("a scene has a TOML form")
+        print(&mut self.clone())
     }
 
     /// Replaces the scene's rate and number of substeps where a value is given.
@@ -244,7 +248,7 @@ impl Scene {
     /// Returns the number of particles, including the generated ones.
     pub(crate) fn particle_count(&self) -> u64 {
         let generated = self.generators.iter().map(|generator| generator.shape.particle_count());
-        self.particles.len() as u64 + generated.sum::<u64>()
+        generated.fold(self.particles.len() as u64, u64::saturating_add)
     }
 
     /// Visits the explicit particles first, then those of each generator.
@@ -254,6 +258,62 @@ impl Scene {
             generator.for_each_particle(self.up, visit);
         }
     }
+}
+
+impl SceneTable for Scene {
+    fn fields(&mut self, fields: &mut Fields<'_>) {
+        if fields.find("version").is_none() {
+            fields.error("version", "is missing (allowed: 1)");
+        }
+        fields.whole("version", &mut self.version, SCENE_VERSION..=SCENE_VERSION);
+        if fields.problem_count() > 0 {
+            return fields.stop();
+        }
+        fields.value("name", &mut self.name, read_name, printed);
+        fields.value("origin", &mut self.origin, read_origin, printed);
+        fields.whole("dimensions", &mut self.dimensions, 2..=3);
+        if let Some(reader) = fields.reader() {
+            reader.is_planar.set(self.dimensions == 2);
+        }
+        fields.word("up", &mut self.up, &Up::NAMES);
+        let read = |at: At<'_>| at.quoted_text().map(str::to_owned);
+        fields.value("unit", &mut self.unit, read, printed);
+        fields.vector("gravity", &mut self.gravity);
+        let problem_count = fields.problem_count();
+        fields.table("solver", &mut self.solver);
+        if let Some(reader) = fields.reader() {
+            reader.is_method_known.set(fields.problem_count() == problem_count);
+        }
+        fields.optional_table("wind", &mut self.wind);
+        fields.table("contact", &mut self.contact);
+        let (method, problem_count) = (self.solver.method, fields.problem_count());
+        fields.tables("particle", &mut self.particles, &SceneParticle::default());
+        let shape = Shape::Rope(Rope::blank());
+        fields.tables("generate", &mut self.generators, &Generator::blank(shape, method));
+        if let Some(reader) = fields.reader().filter(|_| fields.problem_count() == problem_count) {
+            let count = u32::try_from(self.particle_count()).ok();
+            reader.particle_count.set(count.filter(|count| *count <= ELEMENTS_MAX));
+        }
+        fields.tables("constraint", &mut self.constraints, &SceneConstraint::blank(method));
+        fields.tables("bend", &mut self.bends, &SceneBend::default());
+        fields.tables("anchor", &mut self.anchors, &SceneAnchor::default());
+        let shape = ColliderGeometry::Sphere { center: [0.0; 3], radius: 1.0 };
+        fields.tables("collider", &mut self.colliders, &SceneCollider::blank(shape));
+    }
+}
+
+fn read_name(at: At<'_>) -> Option<String> {
+    match at.line()? {
+        "" => at.error("is empty (allowed: a line of text)"),
+        name => Some(name.to_owned()),
+    }
+}
+
+fn read_origin(at: At<'_>) -> Option<[f64; 3]> {
+    let [x, y, z] = at.numbers()?.map(|axis| axis.double());
+    let origin = [x?, y?, z?];
+    let Some(axis) = origin.iter().find(|axis| !axis.is_finite()) else { return Some(origin) };
+    at.error(format!("{axis} is not finite (allowed: finite numbers)"))
 }
 
 /// Size of a scene.

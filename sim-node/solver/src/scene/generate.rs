@@ -12,13 +12,11 @@ pub(super) mod ragdoll;
 pub(super) mod rope;
 pub(super) mod web;
 
-use serde::Serialize;
+use sim_types::{ConstraintKind, Method, Parameter};
 
-use super::definition::decimal;
-use super::definition::element::SceneParticle;
-use super::definition::limits::Limits;
+use super::definition::element::{KindSoftness, Limits, SceneParticle};
 use super::definition::settings::Up;
-use super::definition::softness::KindSoftness;
+use super::fields::{Fields, MASS, NamedKeys, SceneTable, TableShape};
 use super::model::Model;
 use bridge::Bridge;
 use builder::{ConstraintBuilder, ParticleBuilder};
@@ -30,36 +28,69 @@ use rope::Rope;
 use web::Web;
 
 /// A shape with the properties of its particles and constraints.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Generator {
     /// The shape.
-    #[serde(flatten)]
     pub shape: Shape,
     /// Mass of each particle in kg.
-    #[serde(with = "decimal::number")]
     pub mass: f32,
     /// Pinned particles of the shape.
     pub pinned: Pinned,
     /// Softness of the constraints, by kind.
-    #[serde(flatten)]
     pub softness: KindSoftness,
     /// Length / rest length above which the constraints tear, in place of the scene's limit.
     /// Infinity is off.
-    #[serde(with = "decimal::optional", skip_serializing_if = "Option::is_none")]
     pub tear_stretch: Option<f32>,
     /// The particles touch others, in a scene in which particles do; default true.
-    #[serde(skip_serializing_if = "is_true")]
     pub contact: bool,
 }
 
-#[allow(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde calls")]
-fn is_true(value: &bool) -> bool {
-    *value
+impl Generator {
+    /// Returns a shape with the defaults.
+    pub(super) fn blank(shape: Shape, method: Method) -> Self {
+        Self {
+            shape,
+            mass: 1.0,
+            pinned: Pinned::Word("none"),
+            softness: KindSoftness::rigid(method),
+            tear_stretch: None,
+            contact: true,
+        }
+    }
+}
+
+impl SceneTable for Generator {
+    fn fields(&mut self, fields: &mut Fields<'_>) {
+        if !fields.shape(&mut self.shape) {
+            return;
+        }
+        let problem_count = fields.problem_count();
+        match &mut self.shape {
+            Shape::Cloth(cloth) | Shape::Mesh(cloth) => cloth.fields(fields),
+            Shape::Rope(rope) => rope.fields(fields),
+            Shape::Web(web) => web.fields(fields),
+            Shape::Bridge(bridge) => bridge.fields(fields),
+            Shape::Ragdoll(ragdoll) => ragdoll.fields(fields),
+            Shape::Obj(obj) => obj.fields(fields, &mut self.pinned),
+        }
+        fields.number("mass", &mut self.mass, MASS);
+        if let Some(words) = self.shape.pin_words() {
+            let is_read = fields.problem_count() == problem_count;
+            let count = Some(self.shape.particle_count()).filter(|_| is_read);
+            self.pinned.key(fields, words, count);
+        }
+        let range = Parameter::TearStretch.info().range;
+        fields.limit("tear_stretch", &mut self.tear_stretch, range);
+        fields.flag("contact", &mut self.contact, true);
+        self.softness.key(fields);
+        if let Shape::Obj(obj) = &mut self.shape {
+            obj.details.name_fields(fields, obj.faces.len());
+        }
+    }
 }
 
 /// Shape of a generator.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-#[serde(tag = "shape", rename_all = "lowercase")]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Shape {
     /// A hanging sheet.
     Cloth(Cloth),
@@ -88,6 +119,47 @@ impl Shape {
             Self::Bridge(_) => "bridge",
             Self::Ragdoll(_) => "ragdoll",
             Self::Obj(_) => "obj",
+        }
+    }
+}
+
+impl TableShape for Shape {
+    fn word(&self) -> &'static str {
+        self.name()
+    }
+
+    fn blanks() -> Vec<Self> {
+        use ConstraintKind::{Bend, Shear, Structural};
+        vec![
+            Self::Cloth(Cloth::blank(&[Structural, Shear])),
+            Self::Mesh(Cloth::blank(&[Structural, Shear, Bend])),
+            Self::Rope(Rope::blank()),
+            Self::Web(Web::blank()),
+            Self::Bridge(Bridge::blank()),
+            Self::Ragdoll(Ragdoll::blank()),
+            Self::Obj(Obj::default()),
+        ]
+    }
+
+    fn keys() -> Vec<NamedKeys> {
+        let keys = |shape: Self| {
+            NamedKeys::new(shape.name(), &mut Generator::blank(shape, Method::default()))
+        };
+        Self::blanks().into_iter().map(keys).collect()
+    }
+}
+
+impl Shape {
+    /// Returns the words for pinned particles, the default first; none of a mesh, whose words are expressions.
+    fn pin_words(&self) -> Option<&'static [&'static str]> {
+        match self {
+            Self::Cloth(_) => Some(&cloth::PIN_WORDS),
+            Self::Mesh(_) => Some(&["none", "top", "top-even", "corners"]),
+            Self::Rope(_) => Some(&pinned::END_WORDS),
+            Self::Web(_) => Some(&web::PIN_WORDS),
+            Self::Bridge(_) => Some(&["both", "first", "last", "none"]),
+            Self::Ragdoll(_) => Some(&ragdoll::PIN_WORDS),
+            Self::Obj(_) => None,
         }
     }
 

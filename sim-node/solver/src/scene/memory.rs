@@ -3,8 +3,8 @@
 use thiserror::Error;
 
 use super::definition::Scene;
-use super::definition::contact::ContactMode;
 use super::definition::settings::ConstraintOrder;
+use super::definition::settings::ContactMode;
 use super::generate::{Generator, Shape};
 use super::model::ModelSize;
 

@@ -3,6 +3,7 @@
 
 pub(super) mod details;
 pub(super) mod pins;
+pub(super) mod source;
 
 use std::collections::{BTreeMap, BTreeSet};
 

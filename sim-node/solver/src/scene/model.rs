@@ -2,9 +2,9 @@
 
 use std::sync::OnceLock;
 
-use super::definition::bending::{BendParticles, SceneBend};
+use super::definition::element::Limits;
+use super::definition::element::{BendParticles, SceneBend};
 use super::definition::element::{SceneConstraint, SceneParticle};
-use super::definition::limits::Limits;
 use crate::constraints::Constraint;
 use crate::constraints::bends::Bend;
 use crate::constraints::families::Sheet;
@@ -176,11 +176,6 @@ impl Model {
 pub(crate) struct Positions(pub(crate) Vec<[f32; 3]>);
 
 impl Positions {
-    #[allow(clippy::cast_possible_truncation, reason = "a scene has at most 2^24 particles")]
-    pub(crate) fn particle_count(&self) -> u32 {
-        self.0.len() as u32
-    }
-
     /// Returns the distance between two particles in f32, as a step measures it.
     pub(crate) fn distance(&self, a: u32, b: u32) -> f32 {
         distance_squared(self.0[a as usize], self.0[b as usize]).sqrt()

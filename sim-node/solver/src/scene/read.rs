@@ -1,45 +1,28 @@
-//! From TOML text to a checked scene. Each value is checked where it is read.
+//! From TOML text to a checked scene.
+//!
+//! Each table checks its values where they are read. What concerns several tables is checked here, once they are all right.
 
-mod anchor;
-mod body;
-mod collider;
-mod collider_path;
-mod contact;
-mod element;
-mod file_scene;
-mod generator;
-mod limits;
-mod mesh;
-mod reader;
-mod settings;
-mod syntax;
-mod value;
-mod wind;
-
-use std::cell::RefCell;
-use std::mem::take;
-use std::ops::Range;
+use std::cell::{Cell, RefCell};
 use std::path::Path;
 
 use sim_types::{
-    COLLIDERS_MAX, COORDINATE_MAX, ELEMENTS_MAX, Method, ParameterValues, SCENE_SIZE_BYTES_MAX,
+    COLLIDERS_MAX, COORDINATE_MAX, ConstraintKind, ELEMENTS_MAX, Method, SCENE_SIZE_BYTES_MAX,
+    nearest,
 };
 
-use super::definition::collider::SceneCollider;
-use super::definition::settings::Up;
-use super::definition::{SCENE_VERSION, Scene};
-use super::error::{Place, SceneError};
+use super::definition::Scene;
+use super::definition::anchor::SceneAnchor;
+use super::definition::collider::ColliderGeometry;
+use super::definition::element::{BendParticles, SceneBend, SceneConstraint, SceneParticle};
+use super::definition::settings::{ContactMode, ContactSettings, SolverSettings, Wind};
+use super::document::{Table, ValueNode, parse};
+use super::error::{Problems, SceneError};
+use super::fields::{NamedKeys, Reader, TableShape, printed_size, read};
 use super::generate::Shape;
+use super::memory::{check_memory, reading_bytes};
+use super::mesh::area;
 use super::model::Positions;
-use collider::FileCollider;
-use file_scene::FileScene;
-use reader::Reader;
-use settings::FileSolver;
-use value::{Spanned, Tables, Vector, Word};
-
-/// Most memory of all positions, and of the constraints and anchors of the file, in MiB. The greatest
-/// number of particles and the longest complete text need less.
-const REFERENCES_MAX_MIB: u64 = 232;
+use super::solids;
 
 impl Scene {
     /// Reads and checks a scene. `label` names the text in errors: the path of a file, or a name.
@@ -48,8 +31,8 @@ impl Scene {
     /// Takes at most 256 MiB of memory beyond the scene itself.
     ///
     /// # Errors
-    /// The text is not TOML, or a value is wrong. The error names the line, the field and what is
-    /// allowed.
+    /// The text is not TOML, or values are wrong. The error names the line, the field and what is
+    /// allowed for each.
     pub fn from_toml(text: &str, label: &str) -> Result<Self, SceneError> {
         let no_files = |_: &str| Err("a scene without a file cannot name files".to_owned());
         Self::from_toml_with_files(text, label, &no_files)
@@ -68,222 +51,232 @@ impl Scene {
         label: &str,
         read_file: &dyn Fn(&str) -> Result<String, String>,
     ) -> Result<Self, SceneError> {
-        let place = Place { text, label };
-        let mut file = syntax::parse(&place)?;
-        let solver = file.solver.take().unwrap_or_default();
-        let (warnings, method) = (RefCell::default(), Method::default());
-        let mut reader = Reader { place, read_file, warnings, is_planar: false, method };
-        let version = reader.required(file.version.as_ref(), 0..0, "version", "1")?;
-        reader.whole("version", version, SCENE_VERSION..=SCENE_VERSION)?;
-        reader.method = reader.method(&solver)?;
-        let dimensions = file.dimensions.as_ref();
-        let dimensions = dimensions.map(|whole| reader.whole("dimensions", whole, 2..=3));
-        let dimensions = dimensions.transpose()?.unwrap_or(3);
-        reader.is_planar = dimensions == 2;
-        let contact_place = file.contact.as_ref().map(Spanned::span);
-        let generator_places: Vec<_> = file.generate.iter().map(Spanned::span).collect();
-        let mut scene = reader.without_references(&mut file, &solver, dimensions)?;
-        let explicit = ElementCounts {
-            particles: scene.particles.len() as u64,
-            constraints: file.constraint.len() as u64,
-            bends: file.bend.len() as u64,
+        let problems = Problems::new(text, label);
+        check_text(&problems);
+        problems.check()?;
+        let read_file = |path: &str| {
+            let text =
+                read_file(path).map_err(|problem| format!("{problem} (allowed: an OBJ file)"))?;
+            check_memory(reading_bytes(text.len())).map_err(|error| error.to_string())?;
+            Ok(text)
         };
-        reader.check_size(&scene, explicit, &generator_places)?;
-        reader.check_memory(&scene, &file)?;
-        let positions = scene.positions();
-        reader.check_generated(&scene, &positions, &generator_places)?;
-        reader.read_references(&mut scene, file, &positions)?;
-        drop(positions);
-        if let Err(problem) = scene.check_step_work() {
-            return reader.error(solver.place_of_passes(), "solver", problem);
-        }
-        reader.complete_contact(&mut scene, contact_place)?;
-        reader.check_text_size(&mut scene)?;
+        let reader = Reader {
+            problems: &problems,
+            read_file: &read_file,
+            warnings: RefCell::default(),
+            is_planar: Cell::new(false),
+            is_method_known: Cell::new(true),
+            particle_count: Cell::new(None),
+            is_anchored: RefCell::default(),
+            advice,
+        };
+        let stem =
+            Path::new(label).file_stem().map_or("scene".into(), |stem| stem.to_string_lossy());
+        let mut scene = Self::blank(stem.into_owned());
+        let places = read_tables(&reader, text, &mut scene)?;
+        scene.check_size(&problems, &places);
+        problems.check()?;
+        scene.check_positions(&problems, &places)?;
+        scene.complete_contact(&problems, places.contact);
+        problems.check()?;
+        scene.check_text_size(&reader);
+        problems.check()?;
         scene.read_warnings = reader.warnings.take();
         Ok(scene)
     }
 }
 
-/// Reads the tables of a list, and drops them.
-fn enumerate<F, T>(
-    tables: Vec<F>,
-    mut read: impl FnMut(usize, &F) -> Result<T, SceneError>,
-) -> Result<Vec<T>, SceneError> {
-    tables.into_iter().enumerate().map(|(index, table)| read(index, &table)).collect()
+/// Refuses a text that is too long.
+fn check_text(problems: &Problems<'_>) {
+    let size_bytes = problems.text.len();
+    if size_bytes > SCENE_SIZE_BYTES_MAX {
+        let problem = format!("has {size_bytes} bytes of text (allowed: {SCENE_SIZE_BYTES_MAX})");
+        problems.add(0, "scene", problem);
+    } else if let Err(error) = check_memory(reading_bytes(size_bytes)) {
+        problems.add(0, "scene", error.to_string());
+    }
 }
 
-impl Reader<'_> {
-    /// Reads the scene except for its constraints, bends and anchors, which refer to particles by index. Takes
-    /// the tables that it reads.
-    fn without_references(
-        &self,
-        file: &mut FileScene,
-        solver: &FileSolver,
-        dimensions: u32,
-    ) -> Result<Scene, SceneError> {
-        let up = file.up.as_ref().map(|word| self.word("up", word, &Up::NAMES));
-        Ok(Scene {
-            version: SCENE_VERSION,
-            name: self.name(file.name.as_ref())?,
-            origin: self.origin(file.origin.as_ref())?,
-            dimensions,
-            up: up.transpose()?.unwrap_or_default(),
-            unit: file.unit.clone().unwrap_or_else(|| "m".to_owned()),
-            gravity: self.vector_or(
-                "gravity",
-                file.gravity.as_ref(),
-                ParameterValues::DEFAULT.gravity,
-            )?,
-            solver: self.solver(solver)?,
-            wind: file.wind.as_ref().map(|wind| self.wind(wind)).transpose()?,
-            contact: self.contact(file.contact.as_ref().map(|table| &**table.get_ref()))?,
-            particles: enumerate(take(&mut file.particle), |index, one| self.particle(index, one))?,
-            constraints: Vec::new(),
-            bends: Vec::new(),
-            colliders: self.colliders(take(&mut file.collider))?,
-            anchors: Vec::new(),
-            generators: enumerate(take(&mut file.generate), |index, one| {
-                self.generator(index, one)
-            })?,
-            read_warnings: Vec::new(),
-        })
-    }
+/// Places in the text for checks after its document is dropped, in bytes.
+struct Places {
+    generators: Vec<u32>,
+    /// Of the particles of each bend.
+    bends: Vec<u32>,
+    /// Constraints without the key `rest_length`.
+    unmeasured: Vec<u32>,
+    /// Of the counts of passes; 0 if both are the defaults.
+    passes: u32,
+    contact: u32,
+}
 
-    /// Reads the explicit constraints and bends, and the anchors.
-    fn read_references(
-        &self,
-        scene: &mut Scene,
-        file: FileScene,
-        positions: &Positions,
-    ) -> Result<(), SceneError> {
-        scene.constraints =
-            enumerate(file.constraint, |index, one| self.constraint(index, one, positions))?;
-        scene.bends = enumerate(file.bend, |index, one| self.bend(index, one, positions))?;
-        let mut is_anchored = vec![false; positions.0.len()];
-        scene.anchors = enumerate(file.anchor, |index, one| {
-            self.anchor(index, one, positions, &mut is_anchored)
-        })?;
-        Ok(())
-    }
-
-    fn colliders(&self, tables: Tables<FileCollider>) -> Result<Vec<SceneCollider>, SceneError> {
-        if let Some(first_excess) = tables.get(COLLIDERS_MAX) {
-            let problem =
-                format!("is one of {} colliders (allowed: {COLLIDERS_MAX})", tables.len());
-            let field = format!("collider[{COLLIDERS_MAX}]");
-            return self.error(first_excess.span(), &field, problem);
+impl Places {
+    fn new(document: &Table<'_>) -> Self {
+        let start = |node: Option<&ValueNode<'_>>| node.map_or(0, |node| node.start);
+        let solver = document.get("solver");
+        let passes = ["iterations", "substeps"].iter().find_map(|key| solver?.get(key));
+        let constraints = (0..).zip(document.list("constraint"));
+        let unmeasured =
+            constraints.filter(|(_, constraint)| constraint.get("rest_length").is_none());
+        Self {
+            generators: document.list("generate").iter().map(|table| table.start).collect(),
+            bends: document.list("bend").iter().map(|bend| start(bend.get("particles"))).collect(),
+            unmeasured: unmeasured.map(|(index, _)| index).collect(),
+            passes: start(passes),
+            contact: start(document.get("contact")),
         }
-        enumerate(tables, |index, one| self.collider(index, one))
     }
+}
 
-    fn name(&self, name: Option<&Word>) -> Result<String, SceneError> {
-        let Some(name) = name else {
-            let stem = Path::new(self.place.label).file_stem();
-            return Ok(stem.map_or("scene".to_owned(), |stem| stem.to_string_lossy().into_owned()));
-        };
-        let text = name.get_ref();
-        if !text.is_empty() && !text.chars().any(char::is_control) {
-            return Ok(text.clone());
+/// Reads all tables of a text.
+fn read_tables(reader: &Reader<'_>, text: &str, scene: &mut Scene) -> Result<Places, SceneError> {
+    let problems = reader.problems;
+    let document = parse(text, problems);
+    problems.check()?;
+    read(reader, &document, scene);
+    if let Some(excess) = document.list("collider").get(COLLIDERS_MAX) {
+        let count = scene.colliders.len();
+        let problem = format!("is one of {count} colliders (allowed: {COLLIDERS_MAX})");
+        problems.add(excess.start as usize, &format!("collider[{COLLIDERS_MAX}]"), problem);
+    }
+    problems.check()?;
+    for (index, collider) in scene.colliders.iter_mut().enumerate() {
+        if let Some(mesh) = &mut collider.mesh {
+            solids::check(reader, index, &document.list("collider")[index], mesh);
         }
-        let problem = "is empty or has control characters (allowed: a line of text)";
-        self.error(name.span(), "name", problem)
     }
+    problems.check()?;
+    Ok(Places::new(&document))
+}
 
-    fn origin(&self, origin: Option<&Vector>) -> Result<[f64; 3], SceneError> {
-        let Some(origin) = origin else { return Ok([0.0; 3]) };
-        let axes = origin.get_ref().each_ref().map(|axis| *axis.get_ref());
-        if let Some(axis) = axes.iter().find(|axis| !axis.is_finite()) {
-            let problem = format!("{axis} is not finite (allowed: finite numbers)");
-            return self.error(origin.span(), "origin", problem);
-        }
-        Ok(axes)
-    }
-
-    /// Refuses shapes with coordinates that a scene must not have.
-    fn check_generated(
-        &self,
-        scene: &Scene,
-        positions: &Positions,
-        generator_places: &[Range<usize>],
-    ) -> Result<(), SceneError> {
-        let mut first = scene.particles.len();
-        for (index, generator) in scene.generators.iter().enumerate() {
-            let count = usize::try_from(generator.shape.particle_count()).unwrap_or(usize::MAX);
-            let generated = &positions.0[first..first + count];
-            first += count;
-            for &position in generated {
-                // NaN fails this comparison, too.
-                let is_far = !position.iter().all(|axis| axis.abs() <= COORDINATE_MAX);
-                let problem = match position {
-                    _ if is_far => format!("has a particle at {position:?} (allowed: -1e7 to 1e7)"),
-                    [.., z] if self.is_planar && z != 0.0 => {
-                        format!("has a particle at z {z} in a scene of 2 dimensions (allowed: 0)")
-                    }
-                    _ => continue,
-                };
-                let span = generator_places[index].clone();
-                return self.error(span, &format!("generate[{index}]"), problem);
-            }
-        }
-        Ok(())
-    }
-
+impl Scene {
     /// Refuses a scene that is too large, before anything of its size is allocated.
-    fn check_size(
-        &self,
-        scene: &Scene,
-        explicit: ElementCounts,
-        generator_places: &[Range<usize>],
-    ) -> Result<(), SceneError> {
-        let mut counts = explicit;
-        for (index, generator) in scene.generators.iter().enumerate() {
+    fn check_size(&self, problems: &Problems<'_>, places: &Places) {
+        let mut counts = ElementCounts {
+            particles: self.particles.len() as u64,
+            constraints: self.constraints.len() as u64,
+            bends: self.bends.len() as u64,
+        };
+        for (index, generator) in self.generators.iter().enumerate() {
             counts.add(&generator.shape);
             if counts.exceed_limit() {
                 let problem = format!("increases the scene to {}", counts.problem());
-                let span = generator_places[index].clone();
-                return self.error(span, &format!("generate[{index}]"), problem);
+                let start = places.generators[index] as usize;
+                return problems.add(start, &format!("generate[{index}]"), problem);
             }
         }
         if counts.exceed_limit() {
-            return self.error(0..0, "scene", format!("has {}", counts.problem()));
+            return problems.add(0, "scene", format!("has {}", counts.problem()));
         }
-        Ok(())
+        if let Err(problem) = self.check_step_work() {
+            problems.add(places.passes as usize, "solver", problem);
+        }
+        let model = if self.contact.lacks_thickness() { self.model_bytes() } else { 0 };
+        let positions = counts.particles * size_of::<[f32; 3]>() as u64;
+        if let Err(error) = check_memory(positions + model) {
+            problems.add(0, "scene", error.to_string());
+        }
     }
 
-    /// Refuses a scene whose positions need too much memory beside the tables that refer to them.
-    fn check_memory(&self, scene: &Scene, file: &FileScene) -> Result<(), SceneError> {
-        let positions = scene.particle_count() * size_of::<[f32; 3]>() as u64;
-        let size_mib = (positions + file.size_bytes() as u64) >> 20;
-        if size_mib <= REFERENCES_MAX_MIB {
-            let model = if scene.contact.lacks_thickness() { scene.model_bytes() } else { 0 };
-            return self.place.check_memory(positions + scene.particle_count() + model);
+    /// Measures the constraints without a rest length, and refuses shapes and bends whose positions are wrong.
+    fn check_positions(
+        &mut self,
+        problems: &Problems<'_>,
+        places: &Places,
+    ) -> Result<(), SceneError> {
+        let positions = self.positions();
+        for index in &places.unmeasured {
+            let constraint = &mut self.constraints[*index as usize];
+            let [a, b] = constraint.particles;
+            constraint.rest_length = positions.distance(a, b);
         }
-        let problem = format!(
-            "needs {size_mib} MiB for its particles, explicit constraints and anchors while it is \
-             read (allowed: {REFERENCES_MAX_MIB} MiB)"
-        );
-        self.error(0..0, "scene", problem)
+        for (index, (bend, start)) in self.bends.iter().zip(&places.bends).enumerate() {
+            if let Some(problem) = bend_problem(bend.particles, &positions) {
+                problems.add(*start as usize, &format!("bend[{index}].particles"), problem);
+            }
+        }
+        let mut first = self.particles.len();
+        for (index, generator) in self.generators.iter().enumerate() {
+            let count = usize::try_from(generator.shape.particle_count()).unwrap_or(usize::MAX);
+            let mut generated = positions.0[first..first + count].iter();
+            first += count;
+            if let Some(problem) = generated.find_map(|place| self.place_problem(*place)) {
+                let start = places.generators[index] as usize;
+                problems.add(start, &format!("generate[{index}]"), problem);
+            }
+        }
+        problems.check()
+    }
+
+    /// Returns what is wrong with the position of a generated particle.
+    fn place_problem(&self, position: [f32; 3]) -> Option<String> {
+        // NaN fails this comparison, too.
+        let is_near = position.iter().all(|axis| axis.abs() <= COORDINATE_MAX);
+        match position {
+            _ if !is_near => Some(format!("has a particle at {position:?} (allowed: -1e7 to 1e7)")),
+            [.., z] if self.dimensions == 2 && z != 0.0 => {
+                Some(format!("has a particle at z {z} in a scene of 2 dimensions (allowed: 0)"))
+            }
+            _ => None,
+        }
+    }
+
+    /// Refuses surfaces in two dimensions, where a triangle has no side. Takes the smallest rest length of a structural
+    /// constraint for a thickness that the scene needs and does not give.
+    fn complete_contact(&mut self, problems: &Problems<'_>, start: u32) {
+        if self.contact.mode == ContactMode::Surfaces && self.dimensions == 2 {
+            let problem = "\"surfaces\" needs three dimensions (allowed in two: off, particles)";
+            return problems.add(start as usize, "contact.mode", problem);
+        }
+        if !self.contact.lacks_thickness() {
+            return;
+        }
+        let model = self.model();
+        let structural =
+            model.constraints.iter().filter(|one| one.kind == ConstraintKind::Structural);
+        let lengths = structural.map(|one| one.rest_length).filter(|length| *length > 0.0);
+        self.contact.thickness = lengths.min_by(f32::total_cmp);
+        if self.contact.thickness.is_none() {
+            let problem = "is missing, and the scene has no structural constraint with a length to take it \
+                           from (allowed: > 0)";
+            problems.add(start as usize, "contact.thickness", problem);
+        }
     }
 
     /// Refuses a scene whose complete text is too long to be published. What only exports use of its meshes is
     /// left out first.
-    fn check_text_size(&self, scene: &mut Scene) -> Result<(), SceneError> {
-        let mut size_bytes = scene.to_toml().len();
-        if size_bytes > SCENE_SIZE_BYTES_MAX && scene.remove_face_details() {
-            self.warnings.borrow_mut().push(format!(
+    fn check_text_size(&mut self, reader: &Reader<'_>) {
+        let mut size_bytes = printed_size(self);
+        if size_bytes > SCENE_SIZE_BYTES_MAX && self.remove_face_details() {
+            reader.warnings.borrow_mut().push(format!(
                 "texture coordinates, groups and materials are omitted, because the text of the scene would have \
                  {size_bytes} bytes with them (allowed: {SCENE_SIZE_BYTES_MAX})"
             ));
-            size_bytes = scene.to_toml().len();
+            size_bytes = printed_size(self);
         }
-        if size_bytes <= SCENE_SIZE_BYTES_MAX {
-            return Ok(());
+        if size_bytes > SCENE_SIZE_BYTES_MAX {
+            let problem = format!(
+                "has {size_bytes} bytes of text with every default and mesh written out (allowed: \
+                 {SCENE_SIZE_BYTES_MAX})"
+            );
+            reader.problems.add(0, "scene", problem);
         }
-        let problem = format!(
-            "has {size_bytes} bytes of text with every default and mesh written out (allowed: \
-             {SCENE_SIZE_BYTES_MAX})"
-        );
-        self.error(0..0, "scene", problem)
+    }
+}
+
+/// Returns what is wrong with the places of the particles of a bend.
+fn bend_problem(particles: BendParticles, positions: &Positions) -> Option<&'static str> {
+    match particles {
+        BendParticles::Line([a, b, c]) => {
+            let has_length = positions.distance(a, b) > 0.0 && positions.distance(b, c) > 0.0;
+            let problem = "has neighbours that coincide (allowed: neighbours at a distance)";
+            (!has_length).then_some(problem)
+        }
+        BendParticles::Cell([a, b, c, _]) => {
+            let corners = [a, b, c].map(|index| positions.0[index as usize].map(f64::from));
+            let problem = "is a cell without area (allowed: two corners above two corners)";
+            let has_area = area(corners) > 0.0;
+            (!has_area).then_some(problem)
+        }
     }
 }
 
@@ -314,4 +307,41 @@ impl ElementCounts {
              each)"
         )
     }
+}
+
+/// Returns the advice for a key that its table does not have: the tables that have it, or a similar key of another
+/// table. Empty without such a key.
+fn advice(key: &str) -> String {
+    let tables = tables();
+    let owners = NamedKeys::owners(&tables, key);
+    if !owners.is_empty() {
+        return format!(" (a key of {})", owners.join(", "));
+    }
+    // The end of a word alone, such as `speed` of `max_speed`, is too little to point to another table.
+    let begins_alike = |one: &&str| one.chars().next() == key.chars().next();
+    let elsewhere = tables.into_iter().find_map(|NamedKeys { name, keys }| {
+        let nearest = nearest(key, keys.iter().copied().filter(begins_alike))?;
+        Some(format!(" (did you mean '{nearest}' of {name}?)"))
+    });
+    elsewhere.unwrap_or_default()
+}
+
+/// Each table of a scene with its keys.
+fn tables() -> [NamedKeys; 10] {
+    let of_all = |name, shapes: Vec<NamedKeys>| {
+        let keys = shapes.into_iter().flat_map(|shape| shape.keys).collect();
+        NamedKeys { name, keys }
+    };
+    [
+        NamedKeys::new("the top of the file", &mut Scene::blank(String::new())),
+        NamedKeys::new("[solver]", &mut SolverSettings::default()),
+        NamedKeys::new("[wind]", &mut Wind::default()),
+        NamedKeys::new("[contact]", &mut ContactSettings::default()),
+        NamedKeys::new("[[particle]]", &mut SceneParticle::default()),
+        NamedKeys::new("[[constraint]]", &mut SceneConstraint::blank(Method::default())),
+        NamedKeys::new("[[bend]]", &mut SceneBend::default()),
+        of_all("[[collider]]", ColliderGeometry::keys()),
+        NamedKeys::new("[[anchor]]", &mut SceneAnchor::default()),
+        of_all("[[generate]]", Shape::keys()),
+    ]
 }

@@ -44,6 +44,16 @@ pub enum LoadError {
     Wrong(#[from] SceneError),
 }
 
+impl LoadError {
+    /// Returns what is wrong, of a wrong scene as [`SceneError::list`].
+    pub fn list(&self) -> String {
+        match self {
+            Self::Wrong(error) => error.list(),
+            other => other.to_string(),
+        }
+    }
+}
+
 /// Returns `true` if a source is a path: it contains `/` or ends in `.toml`. All other sources are
 /// names of built-in scenes.
 #[allow(clippy::case_sensitive_file_extension_comparisons, reason = "exactly the documented rule")]

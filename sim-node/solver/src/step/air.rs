@@ -1,6 +1,6 @@
 //! The air around the surface of a scene.
 
-use crate::scene::definition::wind::Wind;
+use crate::scene::definition::settings::Wind;
 
 /// The air around the surface of a scene.
 #[derive(Debug, Clone, Default)]

@@ -1,32 +1,44 @@
 //! A bridge of planks on two ropes.
 
 use glam::{DVec3, Vec3};
-use serde::Serialize;
 use sim_types::ConstraintKind;
 
 use super::builder::{ConstraintBuilder, ParticleBuilder, interpolate, round};
 use super::pinned::is_pinned_end;
-use crate::scene::definition::decimal;
+use crate::scene::fields::Fields;
 
 /// Planks across the line between two points. Plank i joins the particles 2 i (left) and 2 i + 1
 /// (right). The constraints follow plank by plank: the plank, then to the next plank left, right
 /// and both diagonals.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Bridge {
     /// Middle of the first plank.
-    #[serde(with = "decimal::vector")]
     pub from: [f32; 3],
     /// Middle of the last plank.
-    #[serde(with = "decimal::vector")]
     pub to: [f32; 3],
     /// Number of planks, at least 2.
     pub planks: u32,
     /// Length of a plank, > 0. Planks are level and perpendicular to the bridge.
-    #[serde(with = "decimal::number")]
     pub width: f32,
 }
 
 impl Bridge {
+    /// Returns a bridge with the defaults.
+    pub(super) fn blank() -> Self {
+        Self { from: [0.0; 3], to: [0.0; 3], planks: 2, width: 1.0 }
+    }
+
+    pub(super) fn fields(&mut self, fields: &mut Fields<'_>) {
+        if fields.is_planar() {
+            let problem = "a bridge needs 3 dimensions (allowed: all other shapes)";
+            fields.error("shape", problem);
+        }
+        fields.point("from", &mut self.from);
+        fields.point("to", &mut self.to);
+        fields.count("planks", &mut self.planks, 2);
+        fields.size("width", &mut self.width);
+    }
+
     pub(super) fn particle_count(&self) -> u64 {
         2 * u64::from(self.planks)
     }

@@ -7,9 +7,8 @@ use super::pinned::Pinned;
 use crate::constraints::Constraint;
 use crate::constraints::bends::Bend;
 use crate::constraints::families::Sheet;
-use crate::scene::definition::element::SceneParticle;
+use crate::scene::definition::element::{KindSoftness, SceneParticle};
 use crate::scene::definition::settings::Up;
-use crate::scene::definition::softness::KindSoftness;
 use crate::scene::model::Model;
 
 /// Creates the particles of one shape.

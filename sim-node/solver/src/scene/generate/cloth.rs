@@ -1,53 +1,92 @@
 //! A sheet of particles.
 
-use serde::Serialize;
-use sim_types::ConstraintKind;
+use sim_types::{ConstraintKind, NumberRange};
 
 use super::builder::{ConstraintBuilder, ParticleBuilder, round};
 use super::folds::Folds;
 use crate::constraints::families::Family;
 use crate::scene::definition::bending::SheetBending;
-use crate::scene::definition::decimal;
+use crate::scene::fields::{At, Fields, printed};
 
 /// A sheet of columns x rows particles. Particle (c, r) has index r columns + c.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Cloth {
     /// Number of columns, at least 1.
     pub columns: u32,
     /// Number of rows, at least 1.
     pub rows: u32,
     /// Distance between neighbours, > 0.
-    #[serde(with = "decimal::number")]
     pub spacing: f32,
     /// Position of particle (0, 0).
-    #[serde(with = "decimal::vector")]
     pub origin: [f32; 3],
     /// Vector from one column to the next, in multiples of the spacing.
-    #[serde(with = "decimal::vector")]
     pub right: [f32; 3],
     /// Vector from one row to the next, in multiples of the spacing.
-    #[serde(with = "decimal::vector")]
     pub down: [f32; 3],
     /// Folds in which the sheet is gathered, if it is.
-    #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub folds: Option<Folds>,
     /// Kinds of constraints to create.
     pub links: Vec<ConstraintKind>,
     /// Diagonals of each cell that have a shear constraint.
     pub diagonals: Diagonals,
     /// Bending rigidity, if it has any.
-    #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub bending: Option<SheetBending>,
 }
 
 /// Diagonals of a cell that have a shear constraint.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(into = "u32")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Diagonals {
     /// Only the one from upper left to lower right.
     One,
     /// Both.
     Two,
+}
+
+impl Cloth {
+    /// Returns a sheet with the defaults.
+    pub(super) fn blank(links: &[ConstraintKind]) -> Self {
+        Self {
+            columns: 1,
+            rows: 1,
+            spacing: 1.0,
+            origin: [0.0; 3],
+            right: [1.0, 0.0, 0.0],
+            down: [0.0, -1.0, 0.0],
+            folds: None,
+            links: links.to_vec(),
+            diagonals: Diagonals::Two,
+            bending: None,
+        }
+    }
+
+    pub(super) fn fields(&mut self, fields: &mut Fields<'_>) {
+        fields.count("columns", &mut self.columns, 1);
+        fields.count("rows", &mut self.rows, 1);
+        fields.require("spacing", NumberRange::POSITIVE.text);
+        fields.number("spacing", &mut self.spacing, NumberRange::POSITIVE);
+        fields.vector("origin", &mut self.origin);
+        fields.vector("right", &mut self.right);
+        fields.vector("down", &mut self.down);
+        Folds::walk(&mut self.folds, fields);
+        let print = |links: &Vec<_>| {
+            printed(&links.iter().map(|kind: &ConstraintKind| kind.name()).collect::<Vec<_>>())
+        };
+        fields.value("links", &mut self.links, read_links, print);
+        let diagonals = [Diagonals::One, Diagonals::Two];
+        let read = |at: At<'_>| at.whole(1..=2).map(|count| diagonals[count as usize - 1]);
+        fields.value("diagonals", &mut self.diagonals, read, |one| printed(&u32::from(*one)));
+        SheetBending::walk(&mut self.bending, fields);
+    }
+}
+
+/// Reads the kinds of constraints in a sheet, ascending and without duplicates.
+fn read_links(at: At<'_>) -> Option<Vec<ConstraintKind>> {
+    use ConstraintKind::{Bend, Shear, Structural};
+    let known = [Structural, Shear, Bend].map(|kind| (kind.name(), kind));
+    let mut kinds: Vec<_> = at.list()?.map(|kind| kind.word(&known)).collect::<Option<_>>()?;
+    kinds.sort_unstable_by_key(|kind| *kind as u32);
+    kinds.dedup();
+    Some(kinds)
 }
 
 impl From<Diagonals> for u32 {

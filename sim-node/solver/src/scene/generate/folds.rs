@@ -1,26 +1,47 @@
 //! Folds of a gathered sheet, such as a curtain on a rail.
 
-use serde::Serialize;
+use sim_types::{ELEMENTS_MAX, NumberRange};
 
-use crate::scene::definition::decimal;
+use crate::scene::fields::{At, Fields, printed};
 
+/// Fullness of gathered sheets: three layers are more than any curtain has.
+const FULLNESS: NumberRange =
+    NumberRange { min: 1.0, max: 3.0, text: "1 to 3", ..NumberRange::SHARE };
+const FULLNESS_DEFAULT: f32 = 2.0;
 /// Rounds of the search for the steepness of the folds: each halves its error.
 const SEARCH_ROUNDS: u32 = 60;
 /// Steepness of the folds at which the sheet turns back by 140 degrees: more than any fullness needs.
 const STEEPNESS_MAX: f64 = 3.0;
 
 /// Folds of a gathered sheet.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Folds {
     /// Number of folds across the sheet, at least 1.
-    #[serde(rename = "folds")]
     pub count: u32,
     /// Width of the sheet laid flat, as a multiple of its width with the folds; at least 1.
-    #[serde(with = "decimal::number")]
     pub fullness: f32,
 }
 
 impl Folds {
+    /// Walks the keys of the folds of a sheet, if it has any.
+    pub(super) fn walk(folds: &mut Option<Self>, fields: &mut Fields<'_>) {
+        let mut count = folds.map(|folds| folds.count);
+        let mut fullness = folds.map(|folds| folds.fullness);
+        let read = |at: At<'_>| {
+            if at.reader.is_planar.get() {
+                return at.error("folds need 3 dimensions (allowed: no folds)");
+            }
+            at.whole(1..=ELEMENTS_MAX).map(Some)
+        };
+        fields.value("folds", &mut count, read, |count| printed(count.as_ref()?));
+        fields.optional_number("fullness", &mut fullness, FULLNESS);
+        if fields.find("fullness").is_some() && fields.find("folds").is_none() {
+            fields.error("fullness", "fullness needs folds (allowed: both or neither)");
+        }
+        let fullness = fullness.unwrap_or(FULLNESS_DEFAULT);
+        *folds = count.map(|count| Self { count, fullness });
+    }
+
     /// Returns for each column its way along the sheet and out of it, in spacings. Neighbours are one spacing apart.
     ///
     /// The sheet turns evenly from one side to the other and back. With t = tan(angle / 2), its direction is

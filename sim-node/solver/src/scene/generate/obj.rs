@@ -2,35 +2,34 @@
 
 use std::collections::BTreeSet;
 
-use serde::Serialize;
-use sim_types::ConstraintKind;
+use glam::{DQuat, Vec3};
+use sim_types::{ConstraintKind, NumberRange};
 
 use super::builder::{ConstraintBuilder, ParticleBuilder, round};
 use super::hinges::Hinges;
+use super::pinned::Pinned;
 use crate::scene::definition::bending::MeshBending;
-use crate::scene::definition::decimal;
+use crate::scene::fields::{At, Fields, SIZE, printed};
+use crate::scene::lists::{print_lists, print_points};
 use crate::scene::mesh::details::FaceDetails;
-use crate::scene::mesh::{Mesh, area, edges, fan};
+use crate::scene::mesh::source::read_mesh;
+use crate::scene::mesh::{Mesh, area, edges, fan, pins};
 
 /// A mesh of polygons. Vertices become particles, and edges become structural constraints. The
 /// diagonals of quads, and those of larger faces from their first corner, become shear
 /// constraints. Across each edge of exactly two faces, bends join the neighbouring corners; with a bending
 /// rigidity, hinges take their place.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Obj {
     /// Positions of the particles.
-    #[serde(serialize_with = "decimal::vectors::serialize")]
     pub vertices: Vec<[f32; 3]>,
     /// Corners of each face, as indices of vertices.
     pub faces: Vec<Vec<u32>>,
     /// Mass per area in kg/unit^2. Without it, each particle has the generator's mass.
-    #[serde(with = "decimal::optional", skip_serializing_if = "Option::is_none")]
     pub density: Option<f32>,
     /// Bending rigidity, if it has any.
-    #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub bending: Option<MeshBending>,
     /// Texture coordinates and names of the faces, which exports write.
-    #[serde(flatten)]
     pub details: FaceDetails,
 }
 
@@ -39,6 +38,30 @@ impl Obj {
     pub fn new(mesh: Mesh, density: Option<f32>, bending: Option<MeshBending>) -> Self {
         let Mesh { vertices, faces, details, groups: _ } = mesh;
         Self { vertices, faces, density, bending, details }
+    }
+
+    /// Walks the keys of the mesh, but for the names of its faces.
+    pub(super) fn fields(&mut self, fields: &mut Fields<'_>, pinned: &mut Pinned) {
+        let problem_count = fields.problem_count();
+        fields.value("vertices", &mut self.vertices, |_| None, |list| printed(&print_points(list)));
+        let print = |list: &Vec<Vec<u32>>| printed(&print_lists(list.iter().map(Vec::as_slice)));
+        fields.value("faces", &mut self.faces, |_| None, print);
+        let mut mesh = read_mesh(fields, "path", Mesh::from_obj).unwrap_or_default();
+        let is_read = fields.problem_count() == problem_count;
+        scale(fields, &mut mesh);
+        let read = |at: At<'_>| pinned_vertices(at, &mesh, is_read);
+        fields.value("pinned", pinned, read, Pinned::print);
+        place(fields, &mut mesh);
+        if fields.reader().is_some() {
+            (self.vertices, self.faces, self.details) = (mesh.vertices, mesh.faces, mesh.details);
+        }
+        fields.optional_number("density", &mut self.density, NumberRange::POSITIVE);
+        MeshBending::walk(&mut self.bending, fields);
+        let vertex_count = self.vertices.len();
+        self.details.uv_fields(fields, vertex_count, Some(&self.faces).filter(|_| is_read));
+        if fields.find("path").is_some() {
+            FaceDetails::refuse(fields);
+        }
     }
 
     /// Returns the indices of the texture coordinates of a face, one for each corner; none if it has none.
@@ -159,6 +182,58 @@ impl Obj {
         }
         sides.sort_unstable_by_key(|side| side.edge);
         sides
+    }
+}
+
+/// Multiplies the vertices by the key `scale`.
+fn scale(fields: &mut Fields<'_>, mesh: &mut Mesh) {
+    let Some(at) = fields.get("scale") else { return };
+    let Some(scale) = at.number(SIZE) else { return };
+    for axis in mesh.vertices.as_flattened_mut() {
+        *axis *= scale;
+    }
+    let range = NumberRange::COORDINATE;
+    let far = mesh.vertices.as_flattened().iter().find(|axis| !range.contains(**axis));
+    if let Some(axis) = far {
+        at.error::<()>(format!("a vertex is at {axis} (allowed: {})", range.text));
+    }
+}
+
+/// Turns the vertices by the key `rotation` about the mesh's own origin, and moves that to the key
+/// `origin`.
+fn place(fields: &mut Fields<'_>, mesh: &mut Mesh) {
+    if let Some(rotation) = fields.get("rotation").and_then(|at| at.rotation()) {
+        let rotation = DQuat::from_array(rotation.map(f64::from)).normalize();
+        for vertex in &mut mesh.vertices {
+            let turned = rotation * Vec3::from_array(*vertex).as_dvec3();
+            *vertex = turned.as_vec3().to_array();
+        }
+    }
+    if let Some(origin) = fields.get("origin").and_then(|at| at.vector()) {
+        let origin = Vec3::from_array(origin);
+        for vertex in &mut mesh.vertices {
+            *vertex = (Vec3::from_array(*vertex) + origin).to_array();
+        }
+    }
+}
+
+/// Reads the pinned vertices of a scaled mesh that is not placed yet, so that all copies of a mesh
+/// can have the same pins.
+fn pinned_vertices(at: At<'_>, mesh: &Mesh, is_read: bool) -> Option<Pinned> {
+    let count = Some(mesh.vertices.len() as u64).filter(|_| is_read);
+    let Some(word) = at.as_text() else { return Pinned::read_list(at, count) };
+    if word == "none" || !is_read {
+        return Some(Pinned::Word("none"));
+    }
+    match pins::matching_vertices(word, mesh) {
+        Ok(list) if list.is_empty() => {
+            let (field, extent) = (at.field(), pins::extent(mesh));
+            let warning = format!("{field} matches no particle of the shape ({extent})");
+            at.reader.warnings.borrow_mut().push(warning);
+            Some(Pinned::Word("none"))
+        }
+        Ok(list) => Some(Pinned::List(list)),
+        Err(problem) => at.error(problem),
     }
 }
 

@@ -1,20 +1,17 @@
 //! A human figure of 15 particles and 20 sticks.
 
 use glam::{DVec3, Vec3};
-use serde::Serialize;
 use sim_types::ConstraintKind;
 
 use super::builder::{ConstraintBuilder, ParticleBuilder, round};
-use crate::scene::definition::decimal;
+use crate::scene::fields::Fields;
 
 /// A standing human figure.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Ragdoll {
     /// Point between the feet.
-    #[serde(with = "decimal::vector")]
     pub origin: [f32; 3],
     /// Height from the feet to the top of the head, > 0.
-    #[serde(with = "decimal::number")]
     pub height: f32,
 }
 
@@ -62,6 +59,16 @@ const BONES: [[u32; 2]; 14] = [
 const BRACES: [[u32; 2]; 6] = [[2, 3], [9, 10], [2, 9], [3, 10], [0, 2], [0, 3]];
 
 impl Ragdoll {
+    /// Returns a figure with the defaults.
+    pub(super) fn blank() -> Self {
+        Self { origin: [0.0; 3], height: 1.0 }
+    }
+
+    pub(super) fn fields(&mut self, fields: &mut Fields<'_>) {
+        fields.vector("origin", &mut self.origin);
+        fields.size("height", &mut self.height);
+    }
+
     pub(super) fn particle_count() -> u64 {
         PLACES.len() as u64
     }

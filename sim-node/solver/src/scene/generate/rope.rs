@@ -1,7 +1,6 @@
 //! A line of particles.
 
 use glam::Vec3;
-use serde::Serialize;
 use sim_types::ConstraintKind;
 
 use super::builder::{ConstraintBuilder, ParticleBuilder, interpolate, round};
@@ -9,25 +8,34 @@ use super::pinned::is_pinned_end;
 use crate::constraints::bends::families::BendFamily;
 use crate::constraints::bends::{Bend, BendShape, SECOND_DIFFERENCE};
 use crate::constraints::families::Family;
-use crate::scene::definition::decimal;
+use crate::scene::fields::{Fields, RIGIDITY};
 
 /// A line of particles. Constraint i joins the particles i and i + 1.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Rope {
     /// Number of particles, at least 2.
     pub count: u32,
     /// Position of the first particle.
-    #[serde(with = "decimal::vector")]
     pub from: [f32; 3],
     /// Position of the last particle.
-    #[serde(with = "decimal::vector")]
     pub to: [f32; 3],
     /// Bending rigidity EI in N m^2, >= 0, if it has any.
-    #[serde(with = "decimal::optional", skip_serializing_if = "Option::is_none")]
     pub bending: Option<f32>,
 }
 
 impl Rope {
+    /// Returns a rope with the defaults.
+    pub(in crate::scene) fn blank() -> Self {
+        Self { count: 2, from: [0.0; 3], to: [0.0; 3], bending: None }
+    }
+
+    pub(super) fn fields(&mut self, fields: &mut Fields<'_>) {
+        fields.count("count", &mut self.count, 2);
+        fields.point("from", &mut self.from);
+        fields.point("to", &mut self.to);
+        fields.optional_number("bending", &mut self.bending, RIGIDITY);
+    }
+
     pub(super) fn particle_count(&self) -> u64 {
         u64::from(self.count)
     }

@@ -1,23 +1,20 @@
 //! A spider's web.
 
 use glam::{DVec3, Vec3};
-use serde::Serialize;
 use sim_types::ConstraintKind;
 
 use super::builder::{ConstraintBuilder, ParticleBuilder, round};
 use crate::frame::rotation_about;
-use crate::scene::definition::decimal;
+use crate::scene::fields::{Fields, printed};
 
 /// A web. The hub is particle 0, followed by the rings from the inside outwards, each spoke by
 /// spoke. The constraints follow in the same order, two each: along the spoke from the inner ring,
 /// then along the ring to the next spoke.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Web {
     /// Position of the hub.
-    #[serde(with = "decimal::vector")]
     pub center: [f32; 3],
     /// Radius of the outermost ring, > 0.
-    #[serde(with = "decimal::number")]
     pub radius: f32,
     /// Number of spokes, at least 3.
     pub spokes: u32,
@@ -25,7 +22,6 @@ pub struct Web {
     pub rings: u32,
     /// Normal of the web's plane. The first spoke points towards x, or towards z if the normal is
     /// nearly parallel to x.
-    #[serde(with = "decimal::vector")]
     pub normal: [f32; 3],
 }
 
@@ -33,6 +29,19 @@ pub struct Web {
 pub(crate) const PIN_WORDS: [&str; 3] = ["rim", "hub", "none"];
 
 impl Web {
+    /// Returns a web with the defaults.
+    pub(super) fn blank() -> Self {
+        Self { center: [0.0; 3], radius: 1.0, spokes: 3, rings: 1, normal: [0.0, 0.0, 1.0] }
+    }
+
+    pub(super) fn fields(&mut self, fields: &mut Fields<'_>) {
+        fields.vector("center", &mut self.center);
+        fields.size("radius", &mut self.radius);
+        fields.count("spokes", &mut self.spokes, 3);
+        fields.count("rings", &mut self.rings, 1);
+        fields.value("normal", &mut self.normal, |at| at.normal(), printed);
+    }
+
     pub(super) fn particle_count(&self) -> u64 {
         1 + u64::from(self.spokes) * u64::from(self.rings)
     }

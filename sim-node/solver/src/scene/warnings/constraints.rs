@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 use crate::constraints::Constraint;
 use crate::scene::definition::Scene;
-use crate::scene::definition::limits::Limits;
-use crate::scene::definition::softness::Softness;
+use crate::scene::definition::element::Limits;
+use crate::scene::definition::element::Softness;
 use crate::scene::model::Model;
 
 /// Returns all constraints with their effective limits.

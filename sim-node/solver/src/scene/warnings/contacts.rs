@@ -18,7 +18,7 @@ use crate::contacts::solid::{Solid, solids};
 use crate::kernels::Kernels;
 use crate::scene::definition::Scene;
 use crate::scene::definition::collider::{ColliderGeometry, SceneCollider};
-use crate::scene::definition::contact::ContactMode;
+use crate::scene::definition::settings::ContactMode;
 use crate::scene::generate::{Generator, Shape};
 use crate::scene::model::Model;
 

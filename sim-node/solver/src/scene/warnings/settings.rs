@@ -2,7 +2,7 @@
 
 use super::rounded::three_digits;
 use crate::scene::definition::Scene;
-use crate::scene::definition::contact::ContactMode;
+use crate::scene::definition::settings::ContactMode;
 use crate::scene::definition::settings::{ConstraintOrder, Up};
 use crate::scene::model::Model;
 
