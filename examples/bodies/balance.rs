@@ -3,7 +3,7 @@
 use rapier3d::glamx::{DVec3, Vec3};
 use serde_json::{Value, json};
 use sim_contract::{
-    ConstraintState, ForceKind, Forces, ParameterValues, ParticleState, SnapshotHeader,
+    ConstraintState, ForceKind, Forces, Parameter, ParameterValues, ParticleState, SnapshotHeader,
 };
 
 use crate::world::World;
@@ -33,8 +33,10 @@ impl Balance {
     /// Takes the external impulses of the next step to observe: gravity, and whatever holds particles.
     pub(crate) fn expect(&mut self, forces: &Forces, parameters: &ParameterValues) {
         self.steps += 1;
-        self.gravity = Vec3::from(parameters.gravity).as_dvec3();
-        self.has_drag |= parameters.damping != 0.0 || parameters.wind_drag != 0.0;
+        self.gravity = Vec3::from(parameters.vector(Parameter::Gravity)).as_dvec3();
+        self.has_drag |= [Parameter::Damping, Parameter::WindDrag]
+            .iter()
+            .any(|one| parameters.number(*one) != 0.0);
         self.dt = 1.0 / f64::from(forces.header.rate_hz);
         let held = forces.of_kind(ForceKind::Particle);
         self.held = held.map(|row| Vec3::from(row.impulse).as_dvec3()).sum();

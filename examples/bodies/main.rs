@@ -15,7 +15,9 @@ mod world;
 use std::time::Duration;
 
 use anyhow::{Context, bail};
-use sim_contract::{Client, ConstraintState, Endpoint, RequestError, SnapshotHeader, Stop};
+use sim_contract::{
+    Client, ConstraintState, Endpoint, Parameter, RequestError, SnapshotHeader, Stop,
+};
 use sim_solver::Scene;
 
 use balance::Balance;
@@ -95,7 +97,7 @@ impl Coupling {
         let forces = forces.with_context(|| format!("no forces of step {}", header.step))?;
         let parameters = client.parameters(TIMEOUT)?.context("the node published no parameters")?;
         self.balance.expect(&forces, &parameters.values);
-        self.world.advance(&forces, parameters.values.gravity);
+        self.world.advance(&forces, parameters.values.vector(Parameter::Gravity));
         self.last = *header;
         Ok(self)
     }

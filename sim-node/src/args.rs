@@ -313,7 +313,7 @@ mod tests {
             ("sim-node run --thraeds 2", "a similar argument exists: '--threads'"),
             ("sim-node lesson eluer", "a similar value exists: 'euler'"),
             ("sim-node ctl get gravty", "did you mean 'gravity'?"),
-            ("sim-node ctl get wind", "did you mean 'wind_velocity'?"),
+            ("sim-node ctl get wind", "did you mean 'wind.velocity'?"),
         ] {
             let text = refused(line);
             assert!(text.contains(tip), "{line}: {text}");

@@ -128,7 +128,7 @@ fn nearest_names_the_particle_at_a_point() {
 fn wind_without_a_surface_is_applied_with_a_hint() {
     let sandbox = Sandbox::new();
     let _node = node(&sandbox, &["run", "rope", "--paused"]);
-    let applied = run(&sandbox, "ctl set wind_velocity 3 0 0");
+    let applied = run(&sandbox, "ctl set wind.velocity 3 0 0");
     assert_eq!((applied.code, applied.stdout.as_str()), (Some(0), "applied at step 1\n"));
     assert_eq!(applied.stderr, "hint: this has no effect: the scene has no surface\n");
 }
@@ -137,23 +137,23 @@ fn wind_without_a_surface_is_applied_with_a_hint() {
 fn wind_without_drag_is_applied_with_a_hint() {
     let sandbox = Sandbox::new();
     let _node = node(&sandbox, &["run", "spring-cloth", "--paused"]);
-    let without = run(&sandbox, "ctl set wind_velocity 3 0 0");
+    let without = run(&sandbox, "ctl set wind.velocity 3 0 0");
     assert_eq!(without.code, Some(0));
-    assert!(without.stderr.starts_with("hint: this has no effect while wind_drag is 0"));
-    run(&sandbox, "ctl set wind_drag 0.5").success();
-    assert_eq!(run(&sandbox, "ctl set wind_velocity 4 0 0").stderr, "");
+    assert!(without.stderr.starts_with("hint: this has no effect while wind.drag is 0"));
+    run(&sandbox, "ctl set wind.drag 0.5").success();
+    assert_eq!(run(&sandbox, "ctl set wind.velocity 4 0 0").stderr, "");
 }
 
 #[test]
 fn friction_without_contacts_is_applied_with_a_hint() {
     let sandbox = Sandbox::new();
     let _node = node(&sandbox, &["run", "curtain", "--paused"]);
-    let without = run(&sandbox, "ctl set contact_friction 0.5");
+    let without = run(&sandbox, "ctl set contact.friction 0.5");
     assert_eq!((without.code, without.stdout.as_str()), (Some(0), "applied at step 1\n"));
-    let hint = "hint: this has no effect while contact is off (see `ctl set contact`)\n";
+    let hint = "hint: this has no effect while contact.thickness is off (see `ctl set contact.thickness`)\n";
     assert_eq!(without.stderr, hint);
-    run(&sandbox, "ctl set contact 0.02").success();
-    assert_eq!(run(&sandbox, "ctl set contact_friction 0.4").stderr, "");
+    run(&sandbox, "ctl set contact.thickness 0.02").success();
+    assert_eq!(run(&sandbox, "ctl set contact.friction 0.4").stderr, "");
 }
 
 #[test]

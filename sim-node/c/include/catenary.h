@@ -17,7 +17,7 @@
 
 #include <stddef.h>
 #include <stdint.h>
-#define CATENARY_CONTRACT_VERSION 6  // version of the layouts of this header
+#define CATENARY_CONTRACT_VERSION 7  // version of the layouts of this header
 #define CATENARY_MEMBERS_MAX 16  // most members of the lockstep
 #define CATENARY_MEMBER_CHANGES_KEPT 32  // changes that a status names
 #define CATENARY_TEXT_SIZE_BYTES_MAX 160  // longest text of a command
@@ -190,41 +190,6 @@ typedef uint32_t catenary_method;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
-// A parameter that can change while a scene runs.
-enum catenary_parameter
-#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
-  : uint32_t
-#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
- {
-  CATENARY_PARAMETER_GRAVITY = 0,
-  CATENARY_PARAMETER_DAMPING = 1,
-  CATENARY_PARAMETER_WIND_VELOCITY = 2,
-  CATENARY_PARAMETER_WIND_DRAG = 3,
-  CATENARY_PARAMETER_SUBSTEPS = 4,
-  CATENARY_PARAMETER_ITERATIONS = 5,
-  CATENARY_PARAMETER_RELAXATION = 6,
-  CATENARY_PARAMETER_MAX_STRETCH = 7,
-  CATENARY_PARAMETER_TEAR_STRETCH = 8,
-  CATENARY_PARAMETER_TEAR_DISTANCE = 9,
-  CATENARY_PARAMETER_TEAR_FORCE = 10,
-  CATENARY_PARAMETER_MAX_SPEED = 11,
-  CATENARY_PARAMETER_TIME_SCALE = 12,
-  CATENARY_PARAMETER_COMPLIANCE = 13,
-  CATENARY_PARAMETER_STIFFNESS = 14,
-  CATENARY_PARAMETER_CONTACT = 15,
-  CATENARY_PARAMETER_CONTACT_FRICTION = 16,
-  CATENARY_PARAMETER_BENDING = 17,
-  CATENARY_PARAMETER_FRICTION = 18,
-  CATENARY_PARAMETER_RESTITUTION = 19,
-};
-#ifndef __cplusplus
-#if __STDC_VERSION__ >= 202311L
-typedef enum catenary_parameter catenary_parameter;
-#else
-typedef uint32_t catenary_parameter;
-#endif // __STDC_VERSION__ >= 202311L
-#endif // __cplusplus
-
 // Reason why a command was rejected. A rejected command changes no bit of the state.
 enum catenary_reason
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -306,6 +271,41 @@ enum catenary_outcome_status
 typedef enum catenary_outcome_status catenary_outcome_status;
 #else
 typedef uint32_t catenary_outcome_status;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+// A parameter that can change while a scene runs. Its number is its index in `PARAMETERS`, which describes it.
+enum catenary_parameter
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  CATENARY_PARAMETER_GRAVITY = 0,
+  CATENARY_PARAMETER_DAMPING = 1,
+  CATENARY_PARAMETER_WIND_VELOCITY = 2,
+  CATENARY_PARAMETER_WIND_DRAG = 3,
+  CATENARY_PARAMETER_SUBSTEPS = 4,
+  CATENARY_PARAMETER_ITERATIONS = 5,
+  CATENARY_PARAMETER_RELAXATION = 6,
+  CATENARY_PARAMETER_MAX_STRETCH = 7,
+  CATENARY_PARAMETER_TEAR_STRETCH = 8,
+  CATENARY_PARAMETER_TEAR_DISTANCE = 9,
+  CATENARY_PARAMETER_TEAR_FORCE = 10,
+  CATENARY_PARAMETER_MAX_SPEED = 11,
+  CATENARY_PARAMETER_TIME_SCALE = 12,
+  CATENARY_PARAMETER_COMPLIANCE = 13,
+  CATENARY_PARAMETER_STIFFNESS = 14,
+  CATENARY_PARAMETER_CONTACT_THICKNESS = 15,
+  CATENARY_PARAMETER_CONTACT_FRICTION = 16,
+  CATENARY_PARAMETER_BENDING = 17,
+  CATENARY_PARAMETER_FRICTION = 18,
+  CATENARY_PARAMETER_RESTITUTION = 19,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum catenary_parameter catenary_parameter;
+#else
+typedef uint32_t catenary_parameter;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 

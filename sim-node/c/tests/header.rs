@@ -139,7 +139,7 @@ fn generate() -> String {
     config.parse.include = Some(vec!["sim-contract".to_owned(), "sim-types".to_owned()]);
     config.export.include = TYPES.iter().map(|(rust, _)| (*rust).to_owned()).collect();
     // Their constants make them opaque types.
-    config.export.exclude = ["NumberRange", "ParticleFlags", "PerKind"].map(str::to_owned).to_vec();
+    config.export.exclude = ["NumberRange", "ParticleFlags"].map(str::to_owned).to_vec();
     config.export.item_types =
         vec![ItemType::Enums, ItemType::Structs, ItemType::OpaqueItems, ItemType::Functions];
     config.export.rename = names().map(|(rust, c)| (rust.to_owned(), c.to_owned())).collect();

@@ -9,8 +9,8 @@ use catenary::*;
 use sim_contract::testing::TestDomain;
 use sim_contract::{
     ColliderState, CollidersHeader, ConstraintState, ForceKind, ForceRow, ForcesHeader, NodeStatus,
-    Outcome, Owner, ParameterValues, ParticleState, SnapshotHeader, TearsHeader, TornConstraint,
-    Triangle, Wake,
+    Outcome, Owner, Parameter, ParameterValues, ParticleState, SnapshotHeader, TearsHeader,
+    TornConstraint, Triangle, Wake,
 };
 
 /// A function of the library that reads.
@@ -44,7 +44,7 @@ fn every_list_arrives() {
     let torn = [TornConstraint { constraint: 0, ..TornConstraint::default() }];
     let header = TearsHeader { run_id: RUN_ID, step: 3, ..TearsHeader::default() };
     owner.publish_tears(header, &torn).unwrap();
-    let values = ParameterValues { damping: 0.25, ..ParameterValues::DEFAULT };
+    let values = ParameterValues::DEFAULT.with(Parameter::Damping, 0.25);
     owner.publish_parameters(RUN_ID, 2, &values).unwrap();
     let colliders = [ColliderState { friction: 0.5, ..ColliderState::default() }];
     let header = CollidersHeader { run_id: RUN_ID, step: 3, ..CollidersHeader::default() };

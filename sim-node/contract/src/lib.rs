@@ -114,11 +114,11 @@ pub use process::file_size::report_file_size_limit;
 pub use process::stop::Stop;
 pub use scratch_domain::ScratchDomain;
 pub use sim_types::{
-    Action, ActionFields, BlockValue, CLIENT_ID_END, COLLIDERS_MAX, COORDINATE_MAX, ColliderFields,
-    ColliderShape, ConstraintKind, ELEMENTS_MAX, GRAB_OVER_S_DEFAULT, KindFilter,
+    Action, ActionFields, Affects, BlockValue, CLIENT_ID_END, COLLIDERS_MAX, COORDINATE_MAX,
+    ColliderFields, ColliderShape, ConstraintKind, ELEMENTS_MAX, GRAB_OVER_S_DEFAULT, KindFilter,
     MOTION_POINTS_MAX, Method, MovedObject, NumberRange, OVER_S_MAX, OffMeaning, PARAMETERS,
-    Parameter, ParameterInfo, ParameterValue, ParameterValues, ParticleFlags, PathError, PathPart,
-    PathPoint, PerKind, PlainF32, PointFault, Reason, RestoreContents, SCENE_SIZE_BYTES_MAX,
-    SETTINGS_COUNT, STEP_WORK_MAX, Setting, TearCause, Text, TextError, ValueForm, allowed_indices,
-    json_hash, printable, printable_line,
+    Parameter, ParameterInfo, ParameterValue, ParameterValues, Part, ParticleFlags, Parts,
+    PathError, PathPart, PathPoint, PlainF32, PointFault, Reason, RestoreContents,
+    SCENE_SIZE_BYTES_MAX, SETTINGS_COUNT, STEP_WORK_MAX, Setting, Slider, TearCause, Text,
+    TextError, ValueForm, allowed_indices, json_hash, printable, printable_line,
 };

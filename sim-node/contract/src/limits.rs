@@ -2,7 +2,7 @@
 
 /// Version of the layouts, service names and quality of service. It is an attribute of each
 /// service, and is checked on open. It changes with any change of the bytes in shared memory.
-pub const CONTRACT_VERSION: u32 = 6;
+pub const CONTRACT_VERSION: u32 = 7;
 
 /// Most commands that a node applies in one poll; the others wait for the next one. A running node
 /// polls once before each step. While it is paused, or waits for a distant step, it polls repeatedly

@@ -382,7 +382,7 @@ impl Simulation {
 
     /// Returns the current parameters by name. None is off.
     fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let values = self.with(py, |running| Ok(running.solver.parameter_values()))?;
+        let values = self.with(py, |running| Ok(running.solver.parameter_values().clone()))?;
         from_json(py, &values)
     }
 

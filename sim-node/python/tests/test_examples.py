@@ -69,7 +69,7 @@ def test_snapshots_reach_rerun(start_node: StartNode, tmp_path: Path) -> None:
 def test_a_controller_pulls_a_point_to_its_height(start_node: StartNode) -> None:
     node = start_node("curtain", "--as-fast-as-possible")
     # A gust would push it by up to 20 mm, depending on when the controller ends.
-    node.set(wind_drag=0)
+    node.set({"wind.drag": 0})
     (distance,) = re.findall(r"is ([\d.]+) mm", run(PROGRAMS / "pull" / "pull.py"))
     assert float(distance) < 10
 

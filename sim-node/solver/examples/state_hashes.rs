@@ -97,7 +97,7 @@ fn command(solver: &mut Solver, step: u32) -> Result<(), sim_solver::Reason> {
         2000 => solver.move_collider(1, pose),
         2500 => solver.set("gravity", ParameterValue::Vector([0.5, -3.0, 0.0]), None),
         3000 => solver.set("substeps", ParameterValue::Number(4.0), None),
-        3500 => solver.set("wind_velocity", ParameterValue::Vector([-4.0, 0.0, 0.0]), None),
+        3500 => solver.set("wind.velocity", ParameterValue::Vector([-4.0, 0.0, 0.0]), None),
         4000 => solver.unpin(15),
         5000 => solver.cut_radius(Sphere { radius: 0.15, ..sphere }),
         6000 => {

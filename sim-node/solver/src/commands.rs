@@ -7,12 +7,14 @@ pub(crate) mod plan;
 pub(crate) mod preparation;
 
 use glam::Vec3;
-use sim_types::{ConstraintKind, MovedObject, Parameter, ParameterValue, ParticleFlags, Reason};
+use sim_types::{
+    Affects, ConstraintKind, MovedObject, Parameter, ParameterValue, Part, ParticleFlags, Reason,
+    Setting,
+};
 
 use crate::checks::{check_finite, is_near};
 use crate::contacts::bodies::driven_body::BodyMotion;
 use crate::frame::{Frame, Pose};
-use crate::parameters::{Affected, Target};
 use crate::solver::{Overfull, Solver};
 use crate::step::drive::{ActiveGrab, GRAB_HORIZON_S};
 use cut::Sphere;
@@ -226,50 +228,33 @@ impl Solver {
         value: ParameterValue,
         kind: Option<ConstraintKind>,
     ) -> Result<(), Reason> {
-        self.set_for(name, value, kind.map_or(Target::All, Target::Kind))
+        self.set_for(name, value, kind.map_or(Part::All, Part::Kind))
     }
 
-    /// Sets the `bending` of a generated block in N m, N m^2 for a rope, from the next step on.
+    /// Sets a parameter, as [`Self::set`] does, for a part of the scene.
     ///
     /// # Errors
-    /// The value is out of range, there is no such block, or it has no bends.
-    pub fn set_block_bending(&mut self, block: u32, bending: f32) -> Result<(), Reason> {
-        let (name, value) = (Parameter::Bending.name(), ParameterValue::Number(bending));
-        self.set_for(name, value, Target::Block(block))
-    }
-
-    /// Sets the `friction` or the `restitution` of one collider, from the next step on.
-    ///
-    /// # Errors
-    /// The parameter is another one, the value is out of range, or there is no such collider.
-    pub fn set_collider(
-        &mut self,
-        name: &str,
-        value: ParameterValue,
-        collider: u32,
-    ) -> Result<(), Reason> {
-        self.set_for(name, value, Target::Collider(collider))
-    }
-
-    fn set_for(&mut self, name: &str, value: ParameterValue, target: Target) -> Result<(), Reason> {
+    /// Those of [`Self::set`], or the parameter has no values for this part.
+    pub fn set_for(&mut self, name: &str, value: ParameterValue, part: Part) -> Result<(), Reason> {
         // Taken out meanwhile, because the context borrows the rest.
         let mut parameters = std::mem::take(&mut self.parameters);
-        let thickness = parameters.contact_thickness;
-        let affected = parameters.set(name, value, target, self.context());
+        let thickness = parameters.contact_thickness();
+        let affected = parameters.set(name, value, part, self.context());
         self.parameters = parameters;
         let affected = affected?;
         // At once, because only the lists of neighbours tell whether they fit.
-        match self.contacts_of_client(self.parameters.contact_thickness) {
+        match self.contacts_of_client(self.parameters.contact_thickness()) {
             Ok(Some(contacts)) => self.replace_particle_contacts(contacts),
             Ok(None) => {}
             Err(Overfull) => {
-                self.parameters.contact_thickness = thickness;
+                let (parameter, value) = (Parameter::ContactThickness, thickness.into());
+                self.parameters.values.set(Setting { parameter, part: Part::All, value });
                 return Err(Reason::OutOfRange);
             }
         }
         self.follow_surfaces();
-        self.due.constraints |= affected > Affected::Nothing;
-        self.due.tethers |= affected == Affected::RigidPaths;
+        self.due.constraints |= affected > Affects::Nothing;
+        self.due.tethers |= affected == Affects::RigidPaths;
         Ok(())
     }
 

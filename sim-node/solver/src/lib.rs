@@ -55,7 +55,7 @@ pub use motion::MOTION_POINTS_MAX;
 pub use scene::{ColliderGeometry, Scene, SceneError, SolverSettings};
 pub use sim_types::{
     Action, BlockValue, COORDINATE_MAX, ConstraintKind, Method, OVER_S_MAX, PARAMETERS, Parameter,
-    ParameterValue, ParameterValues, ParticleFlags, Reason, TearCause,
+    ParameterValue, ParameterValues, Part, ParticleFlags, Reason, Setting, TearCause,
 };
 pub use solver::Solver;
 pub use state::blocks::{Blocks, Chain};

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use sim_types::{ParameterValues, TearCause};
+use sim_types::{Parameter, ParameterValues, TearCause};
 
 use crate::checks::{Context, StepSize};
 use crate::commands::preparation::Prepared;
@@ -185,7 +185,7 @@ impl Solver {
 
     /// Returns `true` if the process can get the memory with which several threads find contacts.
     fn have_threads_memory(&self, threads: usize) -> bool {
-        let contact_mode = match (self.parameters.contact_thickness, self.contact_mode) {
+        let contact_mode = match (self.parameters.contact_thickness(), self.contact_mode) {
             (None, _) => ContactMode::Off,
             (Some(_), ContactMode::Surfaces) => ContactMode::Surfaces,
             (Some(_), _) => ContactMode::Particles,
@@ -275,10 +275,12 @@ impl Solver {
         SceneFields {
             colliders: !self.colliders.is_empty(),
             bounces: parameters.surfaces.have_bounces(),
-            wind: !self.model.triangles.is_empty() && parameters.wind_drag > 0.0,
-            bend_multipliers: !self.model.bends.is_empty() && parameters.iterations > 1,
+            wind: !self.model.triangles.is_empty()
+                && parameters.values.number(Parameter::WindDrag) > 0.0,
+            bend_multipliers: !self.model.bends.is_empty()
+                && parameters.values.count(Parameter::Iterations) > 1,
             tethers: self.settings.tethers as usize,
-            divided_sweep: parameters.contact_thickness.is_some() || self.has_bodies(),
+            divided_sweep: parameters.contact_thickness().is_some() || self.has_bodies(),
         }
     }
 
@@ -299,7 +301,7 @@ impl Solver {
 
     /// Derives the contacts of particles with each other, if their distance has changed.
     pub(crate) fn derive_particle_contacts(&mut self) {
-        if let Some(contacts) = self.contacts_at(self.parameters.contact_thickness) {
+        if let Some(contacts) = self.contacts_at(self.parameters.contact_thickness()) {
             self.replace_particle_contacts(contacts);
         }
     }
@@ -326,7 +328,7 @@ impl Solver {
         &mut self,
         thickness: Option<f32>,
     ) -> Result<Option<ParticleContacts>, Overfull> {
-        if thickness == self.initial_parameters.contact_thickness {
+        if thickness == self.initial_parameters.contact_thickness() {
             return Ok(None);
         }
         match self.contacts_at(thickness) {
@@ -355,7 +357,7 @@ impl Solver {
     }
 
     pub(crate) fn setup(&self, parameters: &Parameters) -> Setup {
-        let h = substep_length(self.settings.rate_hz, parameters.substeps);
+        let h = substep_length(self.settings.rate_hz, parameters.values.count(Parameter::Substeps));
         Setup { method: self.settings.method, h }
     }
 
@@ -397,7 +399,7 @@ impl Solver {
 
     /// Length of a substep in seconds.
     pub(crate) fn h(&self) -> f32 {
-        substep_length(self.settings.rate_hz, self.parameters.substeps)
+        self.setup(&self.parameters).h
     }
 
     /// Properties against which parameters and poses are checked.
@@ -533,9 +535,9 @@ impl Solver {
 
     /// Returns the current parameters. The pace belongs to the node, so the time scale is always that
     /// of real time.
-    pub fn parameter_values(&self) -> ParameterValues {
+    pub fn parameter_values(&self) -> &ParameterValues {
         self.assert_whole();
-        self.parameters.values(self.settings.method)
+        &self.parameters.values
     }
 
     /// Returns the grabbed particles in ascending order, each with the client that holds it.

@@ -15,7 +15,7 @@ pub(crate) mod wind;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use glam::Vec3;
-use sim_types::ParticleFlags;
+use sim_types::{Parameter, ParticleFlags};
 
 use drive::{GRAB_HORIZON_S, GRAB_HORIZON_SUBSTEPS, begin_grabs, count_step, drive_grabbed};
 use prediction::Prediction;
@@ -70,7 +70,7 @@ impl Solver {
     fn make_step(&mut self, stop: &AtomicBool) -> bool {
         self.begin_step();
         let mut is_marked = false;
-        for substep in Substep::all(self.parameters.substeps) {
+        for substep in Substep::all(self.parameters.values.count(Parameter::Substeps)) {
             for stage in Stage::OF_SUBSTEP {
                 match stage {
                     Stage::Drive => self.drive(substep),
@@ -157,14 +157,15 @@ impl Solver {
         for collider in &mut self.colliders {
             collider.begin_step(self.scene_step, time_s, dt);
         }
-        let steps = (GRAB_HORIZON_SUBSTEPS / self.parameters.substeps).max(1);
+        let substeps = self.parameters.values.count(Parameter::Substeps);
+        let steps = (GRAB_HORIZON_SUBSTEPS / substeps).max(1);
         let horizon = self.grab_steps(GRAB_HORIZON_S).min(steps);
         begin_grabs(&mut self.grabs, self.scene_step, horizon);
     }
 
     /// [`Stage::Drive`]. A grab overrides an anchor. Moving roots of tethers are updated.
     fn drive(&mut self, substep: Substep) {
-        let reach = self.parameters.max_speed * self.h();
+        let reach = self.parameters.values.number(Parameter::MaxSpeed) * self.h();
         let Self { store, particles, anchors, grabs, tethers, .. } = self;
         anchors.drive(store, particles, substep.left(), reach);
         drive_grabbed(store, grabs, substep, reach);
@@ -173,12 +174,13 @@ impl Solver {
 
     /// [`Stage::Wind`].
     fn blow(&mut self, substep: Substep) {
-        let drag = self.parameters.wind_drag;
+        let values = &self.parameters.values;
+        let drag = values.number(Parameter::WindDrag);
         if self.model.triangles.is_empty() || drag == 0.0 {
             return;
         }
         let strength = self.air.strength(self.scene_step);
-        let velocity = self.parameters.wind_velocity.map(|axis| strength * axis);
+        let velocity = values.vector(Parameter::WindVelocity).map(|axis| strength * axis);
         let wind = WindStep { velocity, drag, h: self.h(), is_first: substep.is_first() };
         self.store.blow(&wind);
     }
@@ -190,11 +192,13 @@ impl Solver {
         let contact_substep = self.contact_substep(substep);
         place_obstacles(&mut self.obstacles, &self.colliders, &contact_substep);
         let prediction = self.prediction(substep);
-        let relaxation = self.parameters.relaxation;
+        let values = &self.parameters.values;
+        let relaxation = values.number(Parameter::Relaxation);
+        let iterations = values.count(Parameter::Iterations);
         let inputs = SubstepInputs { prediction, relaxation, obstacles: &self.obstacles, stop };
-        let is_marked = self.store.run_swept_stages(&inputs, self.parameters.iterations);
+        let is_marked = self.store.run_swept_stages(&inputs, iterations);
         if self.particle_contacts.are_on() {
-            let friction = self.parameters.contact_friction;
+            let friction = self.parameters.values.number(Parameter::ContactFriction);
             self.particle_contacts.push_apart(&mut self.store, substep, friction);
         }
         if self.body_contacts.are_on() {
@@ -208,18 +212,18 @@ impl Solver {
     }
 
     fn prediction(&self, substep: Substep) -> Prediction {
-        let (h, parameters) = (self.h(), &self.parameters);
+        let (h, values) = (self.h(), &self.parameters.values);
         Prediction {
             h,
-            kept: kept_fraction(parameters.damping * h),
-            gain: parameters.gravity.map(|axis| h * axis),
-            reach: parameters.max_speed * h,
+            kept: kept_fraction(values.number(Parameter::Damping) * h),
+            gain: values.vector(Parameter::Gravity).map(|axis| h * axis),
+            reach: values.number(Parameter::MaxSpeed) * h,
             is_first: substep.is_first(),
         }
     }
 
     fn contact_substep(&self, substep: Substep) -> ContactSubstep {
-        let (h, [x, y, z]) = (self.h(), self.parameters.gravity);
+        let (h, [x, y, z]) = (self.h(), self.parameters.values.vector(Parameter::Gravity));
         let count = substep.count as f32;
         ContactSubstep {
             h,
@@ -286,7 +290,7 @@ mod tests {
     //! Calls after a panic within a step.
     use std::panic::{AssertUnwindSafe, catch_unwind};
 
-    use sim_types::Action;
+    use sim_types::{Action, ParameterValue};
 
     use super::*;
     use crate::commands::cut::Sphere;
@@ -305,7 +309,7 @@ mod tests {
         ("cut_radius", |solver| {
             format!("{:?}", solver.cut_radius(Sphere { center: [0.0; 3], radius: 1.0 }))
         }),
-        ("set_block_bending", |solver| format!("{:?}", solver.set_block_bending(0, 1.0))),
+        ("set", |solver| format!("{:?}", solver.set("damping", ParameterValue::Off, None))),
         ("put_motion_in_place", |solver| format!("{:?}", solver.put_motion_in_place(&[]))),
         ("keyframe", |solver| format!("{:?}", solver.keyframe())),
         ("particles", |solver| format!("{:?}", solver.particles())),

@@ -215,7 +215,7 @@ fn the_web_the_bridge_and_the_flag_hang_and_move() {
     assert!(sag > 0.1 && sag < 0.8, "the middle sags by {sag}");
     // It comes to rest in still air, but not in gusts.
     let (in_gusts, mut calm) = (after("rope-bridge", 240 * 60), Solver::new(&scene("rope-bridge")));
-    calm.set("wind_drag", sim_solver::ParameterValue::Off, None).unwrap();
+    calm.set("wind.drag", sim_solver::ParameterValue::Off, None).unwrap();
     (0..240 * 60).for_each(|_| calm.step());
     let (moving, still) = (range_of_height(in_gusts), range_of_height(calm));
     assert!(moving > 0.02 && still < 0.005, "{moving} m in gusts, {still} m in still air");

@@ -3,7 +3,7 @@
 
 use proptest::prelude::*;
 use sim_solver::{
-    Grab, Keyframe, MOTION_POINTS_MAX, ParameterValue, Particle, ParticleFlags, Pose, Push,
+    Grab, Keyframe, MOTION_POINTS_MAX, ParameterValue, Part, Particle, ParticleFlags, Pose, Push,
     RestoreError, Scene, Solver, Sphere, Sweep, builtin,
 };
 
@@ -28,7 +28,7 @@ enum RandomCommand {
 /// Parameters with a number. Each has the range to which 0 to 1 is mapped.
 const SETTINGS: [(&str, f32, f32); 12] = [
     ("damping", 0.0, 5.0),
-    ("wind_drag", 0.0, 2.0),
+    ("wind.drag", 0.0, 2.0),
     ("relaxation", 0.5, 1.5),
     ("max_stretch", 1.05, 2.0),
     ("tear_stretch", 1.1, 3.0),
@@ -97,7 +97,9 @@ fn apply(solver: &mut Solver, command: &RandomCommand) {
             let (name, low, high) = SETTINGS[which];
             solver.set(name, ParameterValue::Number(low + share * (high - low)), None)
         }
-        RandomCommand::SetBlock(block, value) => solver.set_block_bending(block, value),
+        RandomCommand::SetBlock(block, value) => {
+            solver.set_for("bending", ParameterValue::Number(value), Part::Block(block))
+        }
         RandomCommand::Reset => {
             solver.reset();
             Ok(())

@@ -445,7 +445,7 @@ fn kernels_agree_after_parameters_have_changed() {
         ("iterations", ParameterValue::Number(3.0)),
         ("compliance", ParameterValue::Number(1e-5)),
         ("max_stretch", ParameterValue::Number(1.1)),
-        ("wind_drag", ParameterValue::Number(0.5)),
+        ("wind.drag", ParameterValue::Number(0.5)),
         ("substeps", ParameterValue::Number(4.0)),
         ("tear_force", ParameterValue::Off),
         ("compliance", ParameterValue::Number(0.0)),

@@ -4,7 +4,7 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
-use sim_solver::{BodyMotion, Grab, ParameterValue, Pose, Scene, Solver, builtin};
+use sim_solver::{BodyMotion, Grab, ParameterValue, Part, Pose, Scene, Solver, builtin};
 
 struct Counting;
 
@@ -161,7 +161,7 @@ fn a_change_of_a_parameter_in_use_allocates_nothing() {
             }
         }
         for value in [0.02, 0.03] {
-            let set = solver.set_block_bending(0, value);
+            let set = solver.set_for("bending", ParameterValue::Number(value), Part::Block(0));
             assert_eq!(set.is_ok(), has_bends);
             solver.finish_boundary();
             solver.step();

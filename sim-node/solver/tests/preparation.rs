@@ -168,25 +168,25 @@ fn prepared_contacts_change_no_bit() {
     let mut plain = solver(TOUCHING);
     let mut assisted = Assisted { solver: plain.clone(), spare: None, plan_count: 0 };
     let off = Action::Set {
-        parameter: Text::cut(Parameter::Contact.name()),
+        parameter: Text::cut(Parameter::ContactThickness.name()),
         value: ParameterValue::Off,
         constraint_kind: None,
         block: None,
         collider: None,
     };
     let actions = [
-        set(Parameter::Contact, 0.03),
-        set(Parameter::Contact, 0.01),
+        set(Parameter::ContactThickness, 0.03),
+        set(Parameter::ContactThickness, 0.01),
         Action::Reset,
         off,
-        set(Parameter::Contact, 0.025),
+        set(Parameter::ContactThickness, 0.025),
         set(Parameter::Substeps, 3.0),
         Action::Reset,
     ];
     for (round, action) in actions.iter().cycle().take(14).enumerate() {
         let plan = assisted.solver.plan([*action]);
         let prepared = assisted.prepare(plan);
-        let overtaking = set(Parameter::Contact, 0.015);
+        let overtaking = set(Parameter::ContactThickness, 0.015);
         for step in 0..10 {
             if step == 5 && round == 8 {
                 // What was prepared does not fit, once another command has come first.
@@ -246,7 +246,7 @@ fn constraints_of_a_spare_come_back_without_its_tethers() {
     change(
         &mut plain,
         &mut assisted,
-        &[set(Parameter::Contact, 0.03), set(Parameter::Substeps, 2.0)],
+        &[set(Parameter::ContactThickness, 0.03), set(Parameter::Substeps, 2.0)],
     );
     steps(&mut plain, &mut assisted);
     assert_eq!(assisted.plan_count, 2);

@@ -2,8 +2,8 @@
 //! parameters.
 
 use sim_solver::scene::SceneCounts;
-use sim_solver::{Parameter, Scene, SceneError, Solver, builtin};
-use sim_types::{OffMeaning, ValueForm};
+use sim_solver::{PARAMETERS, Parameter, Scene, SceneError, Solver, builtin};
+use sim_types::{OffMeaning, Parts, ValueForm};
 
 fn builtin_scene(name: &str) -> Scene {
     Scene::from_toml(builtin::text(name).unwrap(), name).unwrap()
@@ -282,36 +282,35 @@ fn a_decimal_is_rounded_once_to_f32() {
 
 /// Returns the scene with a parameter, if its reader accepts the value.
 fn with_parameter(parameter: Parameter, value: f32) -> Result<Scene, SceneError> {
-    let name = parameter.name();
-    let table = match parameter {
-        Parameter::WindDrag => format!("[wind]\ndrag = {value:?}"),
-        Parameter::Contact => format!("[contact]\nthickness = {value:?}"),
-        Parameter::ContactFriction => format!("[contact]\nfriction = {value:?}"),
-        Parameter::Compliance | Parameter::Stiffness => format!(
+    let info = parameter.info();
+    let name = info.name;
+    let value =
+        if info.form == ValueForm::Whole { value.to_string() } else { format!("{value:?}") };
+    let table = match (info.scene_key.split_once('.'), info.parts) {
+        (Some((table, key)), _) => format!("[{table}]\n{key} = {value}"),
+        (None, Parts::Kinds) => format!(
             "[solver]\nmethod = \"{}\"\n[[generate]]\nshape = \"rope\"\ncount = 2\n\
-             from = [0, 0, 0]\nto = [1, 0, 0]\n{name} = {{ structural = {value:?} }}",
-            if parameter == Parameter::Compliance { "xpbd" } else { "pbd" }
+             from = [0, 0, 0]\nto = [1, 0, 0]\n{name} = {{ structural = {value} }}",
+            info.method.unwrap().name()
         ),
-        Parameter::Bending => format!(
+        (None, Parts::Blocks) => format!(
             "[[generate]]\nshape = \"rope\"\ncount = 3\nfrom = [0, 0, 0]\nto = [1, 0, 0]\n\
-             {name} = {value:?}"
+             {name} = {value}"
         ),
-        Parameter::Friction | Parameter::Restitution => format!(
-            "[[collider]]\nshape = \"plane\"\nnormal = [0, 1, 0]\noffset = 0\n{name} = {value:?}"
+        (None, Parts::Colliders) => format!(
+            "[[collider]]\nshape = \"plane\"\nnormal = [0, 1, 0]\noffset = 0\n{name} = {value}"
         ),
-        _ if parameter.info().form == ValueForm::Whole => format!("[solver]\n{name} = {value}"),
-        _ => format!("[solver]\n{name} = {value:?}"),
+        (None, Parts::None) => format!("{name} = {value}"),
     };
     Scene::from_toml(&format!("version = 1\n{table}"), "test")
 }
 
 #[test]
 fn scenes_accept_exactly_the_range_of_each_parameter() {
-    use Parameter::{Gravity, TimeScale, WindVelocity};
-    let all = Parameter::ALL.into_iter();
-    for parameter in all.filter(|one| ![Gravity, WindVelocity, TimeScale].contains(one)) {
-        let range = parameter.info().range;
-        let step = if parameter.info().form == ValueForm::Whole { 1.0 } else { 0.0 };
+    let numbers = PARAMETERS.iter().filter(|info| info.form != ValueForm::Vector);
+    for info in numbers.filter(|info| info.parameter != Parameter::TimeScale) {
+        let (parameter, range) = (info.parameter, info.range);
+        let step = if info.form == ValueForm::Whole { 1.0 } else { 0.0 };
         let below = if step == 0.0 { range.min.next_down() } else { range.min - step };
         let above = if step == 0.0 { range.max.next_up() } else { range.max + step };
         for value in [below, range.min, range.max, above] {
@@ -325,8 +324,7 @@ fn scenes_accept_exactly_the_range_of_each_parameter() {
 #[test]
 fn the_defaults_of_a_scene_are_those_of_the_table_of_parameters() {
     let scene = Scene::from_toml("version = 1\n[wind]\n", "test").unwrap();
-    let values = Solver::new(&scene).parameter_values();
-    for setting in values.settings() {
+    for setting in Solver::new(&scene).parameter_values().settings() {
         let default = setting.parameter.info().default;
         // Still air is the default of the table, too, but its drag is not 0 once there is wind.
         if setting.parameter != Parameter::WindDrag {

@@ -3,8 +3,7 @@
 use std::time::Duration;
 
 use clap::{Args as ClapArgs, Subcommand};
-use sim_cli::did_you_mean;
-use sim_contract::{NumberRange, PARAMETERS, Parameter};
+use sim_contract::{NumberRange, Parameter};
 
 use super::command::CommandVerb;
 use super::endpoint::EndpointArgs;
@@ -157,11 +156,7 @@ impl NearestArgs {
 }
 
 fn parameter(text: &str) -> Result<Parameter, String> {
-    Parameter::from_name(text).ok_or_else(|| {
-        format!(
-            "there is no such parameter{} (allowed: {})",
-            did_you_mean(text, PARAMETERS.map(|info| info.name)),
-            PARAMETERS.map(|info| info.name).join(", ")
-        )
-    })
+    let unknown =
+        || format!("there is no such parameter (allowed: {})", Parameter::allowed_names(text));
+    Parameter::from_name(text).ok_or_else(unknown)
 }

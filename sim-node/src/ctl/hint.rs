@@ -14,8 +14,11 @@ pub(super) fn for_applied(
     match Parameter::from_name(parameter.as_str())? {
         Parameter::WindVelocity => for_wind(client, timeout),
         Parameter::ContactFriction => {
-            let is_off = client.parameters(timeout).ok()??.values.contact.is_none();
-            is_off.then_some("this has no effect while contact is off (see `ctl set contact`)")
+            let values = client.parameters(timeout).ok()??.values;
+            let is_off = values.optional(Parameter::ContactThickness).is_none();
+            is_off.then_some(
+                "this has no effect while contact.thickness is off (see `ctl set contact.thickness`)",
+            )
         }
         _ => None,
     }
@@ -26,6 +29,6 @@ fn for_wind(client: &mut Client, timeout: Duration) -> Option<&'static str> {
     if client.surface(timeout).ok()??.triangles.is_empty() {
         return Some("this has no effect: the scene has no surface");
     }
-    let is_still = client.parameters(timeout).ok()??.values.wind_drag == 0.0;
-    is_still.then_some("this has no effect while wind_drag is 0 (see `ctl set wind_drag`)")
+    let is_still = client.parameters(timeout).ok()??.values.number(Parameter::WindDrag) == 0.0;
+    is_still.then_some("this has no effect while wind.drag is 0 (see `ctl set wind.drag`)")
 }

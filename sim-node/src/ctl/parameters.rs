@@ -2,7 +2,9 @@
 
 use anyhow::bail;
 use serde_json::{Map, Value};
-use sim_contract::{Client, NodeStatus, OffMeaning, Parameter, ParameterValue, Setting};
+use sim_contract::{
+    Client, NodeStatus, OffMeaning, Parameter, ParameterValue, Part, Parts, Setting,
+};
 
 use crate::args::CtlArgs;
 use crate::output;
@@ -24,13 +26,13 @@ pub(super) fn print(
     let mut values = parameters.values;
     // A replay publishes the parameters of the recorded run, but goes at its own rate.
     if let Some(status) = client.status(args.timeout())?.filter(NodeStatus::is_replay) {
-        values.time_scale = to_f32(status.time_scale);
+        values = values.with(Parameter::TimeScale, to_f32(status.time_scale));
     }
     let is_asked = |name: &str| parameter.is_none_or(|parameter| parameter.name() == name);
     // Those of colliders are published with them.
-    let of_colliders_step = match parameter.map(|parameter| parameter.info().is_per_collider) {
-        Some(false) => 0,
-        Some(true) | None => client.colliders(args.timeout())?.header.step,
+    let of_colliders_step = match parameter.map(|parameter| parameter.info().parts) {
+        Some(Parts::None | Parts::Kinds | Parts::Blocks) => 0,
+        Some(Parts::Colliders) | None => client.colliders(args.timeout())?.header.step,
     };
     let step = parameters.header.step.max(of_colliders_step);
     if args.json {
@@ -71,7 +73,7 @@ fn of_colliders(
     asked: Option<Parameter>,
 ) -> anyhow::Result<Vec<(&'static str, Vec<f32>)>> {
     let is_asked = |one: Parameter| asked.is_none_or(|asked| asked == one);
-    if asked.is_some_and(|asked| !asked.info().is_per_collider) {
+    if asked.is_some_and(|asked| asked.info().parts != Parts::Colliders) {
         return Ok(Vec::new());
     }
     let colliders = client.colliders(args.timeout())?.colliders;
@@ -90,17 +92,14 @@ fn to_f32(value: f64) -> f32 {
 /// Name, kind of constraints or block, value and unit.
 fn cells(setting: &Setting) -> [String; 4] {
     let info = setting.parameter.info();
-    let value = match (setting.value, info.off) {
-        (ParameterValue::Number(number), _) => number.to_string(),
-        (ParameterValue::Vector(vector), _) => vector.map(|number| number.to_string()).join(" "),
-        (ParameterValue::Off, OffMeaning::OwnOfEach) => "as loaded".to_owned(),
-        (ParameterValue::Off, _) => "off".to_owned(),
+    let (value, unit) = match (setting.value, info.off) {
+        (ParameterValue::Off, OffMeaning::OwnOfEach) => ("as loaded".to_owned(), ""),
+        (ParameterValue::Off, _) => (setting.value.to_string(), ""),
+        (value, _) => (value.to_string(), info.unit),
     };
-    let unit = if matches!(setting.value, ParameterValue::Off) { "" } else { info.unit };
-    let part = match (setting.constraint_kind, setting.block) {
-        (Some(kind), _) => kind.name().to_owned(),
-        (None, Some(block)) => format!("block {block}"),
-        (None, None) => String::new(),
+    let part = match setting.part {
+        Part::All => String::new(),
+        part => part.to_string(),
     };
     [info.name.to_owned(), part, value, unit.to_owned()]
 }
@@ -113,19 +112,16 @@ mod tests {
 
     #[test]
     fn values_are_shown_as_ctl_set_accepts_them() {
-        let cells = |parameter, constraint_kind, value| {
-            cells(&Setting { parameter, constraint_kind, block: None, value }).join("|")
-        };
+        let cells = |parameter, part, value| cells(&Setting { parameter, part, value }).join("|");
         let gravity = ParameterValue::Vector([0.0, -9.81, 0.0]);
-        assert_eq!(cells(Parameter::Gravity, None, gravity), "gravity||0 -9.81 0|m/s²");
-        assert_eq!(cells(Parameter::TearForce, None, ParameterValue::Off), "tear_force||off|");
-        let shear = Some(ConstraintKind::Shear);
+        assert_eq!(cells(Parameter::Gravity, Part::All, gravity), "gravity||0 -9.81 0|m/s²");
+        assert_eq!(cells(Parameter::TearForce, Part::All, ParameterValue::Off), "tear_force||off|");
+        let shear = Part::Kind(ConstraintKind::Shear);
         let number = ParameterValue::Number(1e-4);
         assert_eq!(cells(Parameter::Compliance, shear, number), "compliance|shear|0.0001|m/N");
         let off = ParameterValue::Off;
         assert_eq!(cells(Parameter::Compliance, shear, off), "compliance|shear|as loaded|");
-        let parameter = Parameter::Bending;
-        let of_block = Setting { parameter, constraint_kind: None, block: Some(1), value: number };
-        assert_eq!(super::cells(&of_block).join("|"), "bending|block 1|0.0001|N m");
+        let of_block = cells(Parameter::Bending, Part::Block(1), number);
+        assert_eq!(of_block, "bending|block 1|0.0001|N m");
     }
 }

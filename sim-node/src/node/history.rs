@@ -295,7 +295,7 @@ mod tests {
     /// Memory for `count` states and one keyframe.
     fn limit_bytes(count: usize, solver: &Solver) -> usize {
         let state = ENTRY_SIZE_BYTES + solver.particle_count().max(8) * size_of::<Particle>() + 4;
-        count * state + if count == 0 { 0 } else { solver.keyframe().encode().len() + 500 }
+        count * state + if count == 0 { 0 } else { solver.keyframe().encode().len() + 400 }
     }
 
     /// A history with room for about `count` states, after the steps up to `last`.

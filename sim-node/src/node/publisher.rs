@@ -13,8 +13,8 @@ use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{
     CONTRACT_VERSION, ColliderState, CollidersHeader, Command, ConnectionId, Endpoint,
     ForcesHeader, KeyframeHeader, LoadPreparer, OUTCOME_FLAG_DISCONNECTED, Outcome, Owner,
-    OwnerError, ParameterValues, ParticleState, Ready, Reason, ReceivedCommand, SnapshotFlags,
-    SnapshotHeader, TearsHeader, TornConstraint, Wake,
+    OwnerError, Parameter, ParameterValues, ParticleState, Ready, Reason, ReceivedCommand,
+    SnapshotFlags, SnapshotHeader, TearsHeader, TornConstraint, Wake,
 };
 use sim_solver::{Applied, SOLVER_VERSION, Scene, Solver};
 
@@ -366,7 +366,7 @@ impl Publisher {
         if values == self.parameters {
             return Ok(());
         }
-        self.parameters = values.clone();
+        self.parameters.clone_from(&values);
         Ok(self.owner.publish_parameters(self.run_id, step, &values)?)
     }
 
@@ -507,7 +507,7 @@ impl Publisher {
 fn parameter_values(solver: &Solver, time_scale: f64) -> ParameterValues {
     #[allow(clippy::cast_possible_truncation, reason = "it came from an f32")]
     let time_scale = time_scale as f32;
-    ParameterValues { time_scale, ..solver.parameter_values() }
+    solver.parameter_values().clone().with(Parameter::TimeScale, time_scale)
 }
 
 /// step / rate in nanoseconds, rounded down. Whole seconds apart from the rest, so that nothing

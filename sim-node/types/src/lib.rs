@@ -44,8 +44,11 @@ pub use limits::{
     SCENE_SIZE_BYTES_MAX, STEP_WORK_MAX,
 };
 pub use method::Method;
-pub use parameter::{OffMeaning, PARAMETERS, Parameter, ParameterInfo, ParameterValue, ValueForm};
-pub use parameter_values::{BlockValue, ParameterValues, PerKind, SETTINGS_COUNT, Setting};
+pub use parameter::{
+    Affects, OffMeaning, PARAMETERS, Parameter, ParameterInfo, ParameterValue, Part, Parts, Slider,
+    ValueForm,
+};
+pub use parameter_values::{BlockValue, ParameterValues, SETTINGS_COUNT, Setting};
 pub use particle_flags::ParticleFlags;
 pub use path_part::{PathError, PathPart, PathPoint, PointFault};
 pub use range::{COORDINATE_MAX, NumberRange, allowed_indices};
@@ -78,7 +81,6 @@ mod tests {
         assert_names_and_numbers!(super::ConstraintKind, u32);
         assert_names_and_numbers!(super::ColliderShape, u32);
         assert_names_and_numbers!(super::Method, u32);
-        assert_names_and_numbers!(super::Parameter, u32);
         assert_names_and_numbers!(super::TearCause, u32);
     }
 

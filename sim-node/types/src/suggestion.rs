@@ -3,10 +3,11 @@
 /// Returns the known word that an unknown word most likely stands for, or `None` if no word is similar.
 ///
 /// A typing error is a missing, added or wrong letter, or two swapped neighbours. A known word is similar if there is at
-/// most one error for each three letters; case, and `_` in place of `-`, do not count. If no word is similar, a known word
-/// that begins or ends with the unknown one is returned: `friction` stands for `contact_friction`.
+/// most one error for each three letters; case, and `_`, `.` or a space in place of `-`, do not count. If no word is similar, a known word
+/// that begins or ends with the unknown one is returned: `friction` stands for `contact.friction`.
 pub fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    let plain = |word: &str| word.trim_start_matches('-').to_lowercase().replace(['_', ' '], "-");
+    let plain =
+        |word: &str| word.trim_start_matches('-').to_lowercase().replace(['_', ' ', '.'], "-");
     let word = plain(word);
     let length = word.chars().count();
     if length < 2 {
@@ -34,7 +35,7 @@ mod tests {
 
     #[test]
     fn the_nearest_word_is_one_typing_error_in_three_letters_away() {
-        let known = ["run", "scenes", "show", "tear_force", "contact_friction", "wind_velocity"];
+        let known = ["run", "scenes", "show", "tear_force", "contact.friction", "wind.velocity"];
         for (word, nearest_word) in [
             ("rnu", Some("run")),
             ("Run", Some("run")),
@@ -42,8 +43,8 @@ mod tests {
             ("shwo", Some("show")),
             ("tear-force", Some("tear_force")),
             ("taer_frce", Some("tear_force")),
-            ("friction", Some("contact_friction")),
-            ("wind", Some("wind_velocity")),
+            ("friction", Some("contact.friction")),
+            ("wind", Some("wind.velocity")),
             ("gravity", None),
             ("r", None),
             ("", None),

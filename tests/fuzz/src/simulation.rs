@@ -1,6 +1,6 @@
 //! Small scenes, and comparisons of their complete state.
 
-use sim_contract::ParticleFlags;
+use sim_contract::{Parameter, ParticleFlags};
 use sim_solver::{Kernels, Particle, Scene, Solver};
 
 /// The scenes of the targets with a solver. The first byte of their input selects one.
@@ -63,7 +63,9 @@ impl Pair {
     /// True if a step takes little time.
     pub fn is_cheap(&self) -> bool {
         let values = self.fast.parameter_values();
-        values.substeps.saturating_mul(values.iterations) <= PASSES_MAX
+        let [substeps, iterations] =
+            [Parameter::Substeps, Parameter::Iterations].map(|one| values.count(one));
+        substeps.saturating_mul(iterations) <= PASSES_MAX
     }
 
     /// Makes a step of both solvers. The kernels produce the same bits, and no particle leaves the

@@ -54,7 +54,7 @@ pub(super) const COMMANDS: &[&str] = &[
     r#"{"kind":"push","center":[POINT,POINT,POINT],"radius":1,"delta":[0,0,POINT],"limit":0.01}"#,
     r#"{"kind":"cut","constraint":CONSTRAINT}"#,
     r#"{"kind":"cut_radius","center":[POINT,POINT,POINT],"radius":0.1}"#,
-    r#"{"kind":"set","parameter":"wind_drag","value":POINT}"#,
+    r#"{"kind":"set","parameter":"wind.drag","value":POINT}"#,
     r#"{"kind":"set","parameter":"substeps","value":0}"#,
     r#"{"kind":"pause"}"#,
     r#"{"kind":"resume"}"#,

@@ -3,6 +3,7 @@
 
 use integration_tests::{DEADLINE, wait_for};
 use serde_json::json;
+use sim_contract::Parameter;
 use viewer_bridge::scene::catalog::Catalog;
 
 use crate::browser::picture::SWINGING;
@@ -187,8 +188,10 @@ fn values_are_typed_beside_their_sliders_and_reset_parameters_restores_them() {
     rig.tab.type_into("input[aria-label='Tear force in N']", "5e3");
     wait_for("the typed values in the node", || {
         let values = rig.client().parameters(DEADLINE).unwrap().unwrap().values;
-        let is_set = (values.damping, values.gravity) == (2.125, [0.0, -1.62, 0.0]);
-        (is_set && values.tear_force == Some(5e3)).then_some(())
+        let is_set = values.number(Parameter::Damping) == 2.125
+            && values.vector(Parameter::Gravity) == [0.0, -1.62, 0.0]
+            && values.optional(Parameter::TearForce) == Some(5e3);
+        is_set.then_some(())
     });
     rig.tab.wait(
         "document.querySelector('#set-damping').getAttribute('aria-valuetext') === '2.125 1/s'",

@@ -101,7 +101,7 @@ fn a_released_particle_keeps_the_velocity_of_the_pointer() {
 fn a_stroke_with_the_right_button_cuts_the_sticks_it_crosses() {
     // The cloth sags at the cut while the stroke continues. In wind it would also move away before.
     let mut rig = Rig::new(&["curtain", "--paused"], "");
-    ctl(&rig.sandbox, &["set", "wind_drag", "off"]);
+    ctl(&rig.sandbox, &["set", "wind.drag", "off"]);
     rig.tab.key(' ');
     rig.tab.wait("!viewer.paused");
     let camera = rig.tab.camera();

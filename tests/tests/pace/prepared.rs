@@ -31,7 +31,7 @@ fn set(parameter: &str, value: f32) -> Action {
 #[test]
 fn a_set_of_a_large_scene_is_prepared_beside_the_loop_and_only_its_client_waits() {
     assert_is_prepared(TETHERS, "compliance", 1e-6);
-    assert_is_prepared(CONTACTS, "contact", 5e-3);
+    assert_is_prepared(CONTACTS, "contact.thickness", 5e-3);
 }
 
 /// Sets a parameter of a large scene with these keys, again and again, beginning with a value, until another client
@@ -66,7 +66,7 @@ fn assert_is_prepared(keys: &str, parameter: &str, first: f32) {
 #[test]
 fn a_recording_of_prepared_commands_verifies() {
     assert_verifies(TETHERS, "compliance", 1e-6);
-    assert_verifies(CONTACTS, "contact", 1e-3);
+    assert_verifies(CONTACTS, "contact.thickness", 1e-3);
 }
 
 /// Records settings of a parameter, multiples of a unit, in a scene with these keys.

@@ -8,7 +8,8 @@ use integration_tests::storm::{self, HeldState, Storm};
 use integration_tests::{DEADLINE, Finished, Process, Program, Sandbox, ctl, record, wait_for};
 use recording::{Frame, FrameReader, LogReader, Message};
 use sim_contract::{
-    Action, Client, GivenState, Outcome, ParticleFlags, ParticleState, Reason, RestoreContents, Tap,
+    Action, Client, GivenState, Outcome, Parameter, ParticleFlags, ParticleState, Reason,
+    RestoreContents, Tap,
 };
 
 fn node(sandbox: &Sandbox, args: &[&str]) -> Process {
@@ -335,7 +336,7 @@ fn a_reader_follows_a_rewind_with_all_that_belongs_to_it() {
             }
             assert_eq!(state.header.torn_count as usize, torn.len());
             assert_eq!(state.torn.indices().collect::<Vec<_>>(), torn);
-            assert_eq!(state.parameters.values.damping, damping);
+            assert_eq!(state.parameters.values.number(Parameter::Damping), damping);
             Some(())
         });
     }

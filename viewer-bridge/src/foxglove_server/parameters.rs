@@ -8,8 +8,8 @@ use foxglove::websocket::{
     Parameter as NamedValue, ParameterType, ParameterValue as FoxgloveValue,
 };
 use sim_contract::{
-    ConstraintKind, KindFilter, OffMeaning, Parameter, ParameterInfo, ParameterValue,
-    ParameterValues, Reason, ValueForm,
+    ConstraintKind, KindFilter, OffMeaning, PARAMETERS, Parameter, ParameterInfo, ParameterValue,
+    ParameterValues, Part, Parts, Reason, ValueForm,
 };
 
 use crate::message::Command;
@@ -21,57 +21,32 @@ const OWN_OF_EACH: &str = "as in the scene";
 
 /// Lists all parameters with their values, except those of colliders, which are in `/colliders`.
 pub(super) fn list(values: &ParameterValues) -> Vec<NamedValue> {
-    let of_scene = Parameter::ALL.into_iter().filter(|one| !one.info().is_per_collider);
-    of_scene.flat_map(|parameter| named_values(parameter, values)).collect()
+    let of_scene = PARAMETERS.iter().filter(|info| info.parts == Parts::Kinds);
+    let common = of_scene.map(|info| (info.parameter, Part::All, common_value(values, info)));
+    let settings = values.settings().into_iter();
+    let settings = settings.map(|one| (one.parameter, one.part, one.value));
+    let mut all: Vec<_> = common.chain(settings).collect();
+    all.sort_by_key(|(parameter, ..)| *parameter as u32);
+    all.into_iter().map(|(parameter, part, value)| named(parameter, part, value)).collect()
 }
 
-/// Lists the values of one parameter: one, or one for all kinds of constraints and one for each; of `bending`,
-/// one for all bends, and one for each block with a value of its own.
-fn named_values(parameter: Parameter, values: &ParameterValues) -> Vec<NamedValue> {
-    let info = parameter.info();
-    if !info.is_per_kind {
-        let mut list = vec![named(info.name, info, values.get(parameter, None))];
-        if parameter == Parameter::Bending {
-            list.extend(
-                values.bending_by_block.iter().map(|one| {
-                    named(&block_name(one.block), info, ParameterValue::Number(one.value))
-                }),
-            );
-        }
-        return list;
-    }
-    let each = ConstraintKind::ALL.map(|kind| values.get(parameter, Some(kind)));
-    let is_same = each.iter().all(|value| *value == each[0]);
-    let common = if is_same { each[0] } else { ParameterValue::Off };
-    let mut list = vec![named(info.name, info, common)];
-    list.extend(
-        ConstraintKind::ALL
-            .iter()
-            .zip(each)
-            .map(|(kind, value)| named(&format!("{}.{}", info.name, kind.name()), info, value)),
-    );
-    list
+/// The value that all kinds of constraints have.
+fn common_value(values: &ParameterValues, info: &ParameterInfo) -> ParameterValue {
+    let [first, others @ ..] =
+        ConstraintKind::ALL.map(|kind| values.get(info.parameter, Part::Kind(kind)));
+    if others.iter().all(|value| *value == first) { first } else { ParameterValue::Off }
 }
 
 /// Returns the blocks of `old` that have no bending of their own any more, with that of all bends.
-pub(super) fn ended_blocks(old: &[NamedValue], new: &ParameterValues) -> Vec<NamedValue> {
-    let info = Parameter::Bending.info();
-    let is_listed =
-        |name: &str| new.bending_by_block.iter().any(|one| block_name(one.block) == name);
-    let ended = old.iter().map(|one| one.name.as_str());
-    let ended = ended.filter(|name| is_block_name(name) && !is_listed(name));
-    ended.map(|name| named(name, info, new.get(Parameter::Bending, None))).collect()
+pub(super) fn ended_blocks(old: &ParameterValues, new: &ParameterValues) -> Vec<NamedValue> {
+    let is_listed = |block| new.bending_by_block.iter().any(|one| one.block == block);
+    let blocks = old.bending_by_block.iter().map(|one| one.block);
+    let ended = blocks.filter(|block| !is_listed(*block)).map(Part::Block);
+    ended.map(|part| named(Parameter::Bending, part, new.get(Parameter::Bending, part))).collect()
 }
 
-fn block_name(block: u32) -> String {
-    format!("{}.{block}", Parameter::Bending.name())
-}
-
-fn is_block_name(name: &str) -> bool {
-    name.split_once('.').is_some_and(|(name, _)| name == Parameter::Bending.name())
-}
-
-fn named(name: &str, info: &ParameterInfo, value: ParameterValue) -> NamedValue {
+fn named(parameter: Parameter, part: Part, value: ParameterValue) -> NamedValue {
+    let info = parameter.info();
     let (r#type, value) = match value {
         ParameterValue::Off => {
             let word = if info.off == OffMeaning::OwnOfEach { OWN_OF_EACH } else { OFF };
@@ -89,7 +64,7 @@ fn named(name: &str, info: &ParameterInfo, value: ParameterValue) -> NamedValue 
             (Some(ParameterType::Float64), FoxgloveValue::Float64(same_decimals(number)))
         }
     };
-    NamedValue { name: name.to_owned(), r#type, value: Some(value) }
+    NamedValue { name: parameter.path(part), r#type, value: Some(value) }
 }
 
 /// Returns the f64 with the same decimals as the f32: 0.1, not 0.10000000149.
@@ -99,26 +74,15 @@ fn same_decimals(value: f32) -> f64 {
 
 /// Creates the command that sets a parameter.
 pub(super) fn command(named: &NamedValue) -> Result<Command, Reason> {
-    let (name, part) = match named.name.split_once('.') {
-        None => (named.name.as_str(), None),
-        Some((name, part)) => (name, Some(part)),
-    };
-    let info = Parameter::from_name(name).ok_or(Reason::UnknownParameter)?.info();
-    let index = |part: &str| part.parse().map(Some).map_err(|_| Reason::UnknownParameter);
-    let (mut constraint_kind, mut block, mut collider) = (None, None, None);
-    match part.map(|part| (part, KindFilter::from_name(part))) {
-        None => {}
-        Some((part, _)) if info.parameter == Parameter::Bending => block = index(part)?,
-        Some((part, _)) if info.is_per_collider => collider = index(part)?,
-        Some((_, known @ KindFilter::Known(_))) if info.is_per_kind => {
-            constraint_kind = Some(known);
-        }
-        Some(_) => return Err(Reason::UnknownParameter),
-    }
-    let can_be_off =
-        matches!(info.off, OffMeaning::Zero | OffMeaning::NoLimit | OffMeaning::Absent);
+    let (parameter, part) =
+        Parameter::from_path(&named.name).map_err(|_| Reason::UnknownParameter)?;
+    let info = parameter.info();
     let value = match (&named.value, info.form) {
-        (Some(FoxgloveValue::String(word)), _) if word == OFF && can_be_off => ParameterValue::Off,
+        (Some(FoxgloveValue::String(word)), _)
+            if word == OFF && info.accepts(ParameterValue::Off) =>
+        {
+            ParameterValue::Off
+        }
         (Some(FoxgloveValue::Array(axes)), ValueForm::Vector) => {
             let [x, y, z] = axes.as_slice() else { return Err(Reason::OutOfRange) };
             ParameterValue::Vector([number(x)?, number(y)?, number(z)?])
@@ -128,14 +92,15 @@ pub(super) fn command(named: &NamedValue) -> Result<Command, Reason> {
         }
         _ => return Err(Reason::OutOfRange),
     };
-    Ok(Command::Set {
-        parameter: name.to_owned(),
-        value,
-        constraint_kind,
-        block,
-        collider,
-        stroke: None,
-    })
+    let (mut constraint_kind, mut block, mut collider) = (None, None, None);
+    match part {
+        Part::All => {}
+        Part::Kind(kind) => constraint_kind = Some(KindFilter::Known(kind)),
+        Part::Block(index) => block = Some(index),
+        Part::Collider(index) => collider = Some(index),
+    }
+    let parameter = parameter.name().to_owned();
+    Ok(Command::Set { parameter, value, constraint_kind, block, collider, stroke: None })
 }
 
 #[allow(clippy::cast_possible_truncation, reason = "the value is rounded once, here")]
@@ -149,7 +114,7 @@ fn number(value: &FoxgloveValue) -> Result<f32, Reason> {
 
 #[cfg(test)]
 mod tests {
-    use sim_contract::BlockValue;
+    use sim_contract::Setting;
 
     use super::*;
 
@@ -165,9 +130,8 @@ mod tests {
     #[test]
     fn every_parameter_is_listed_and_can_be_set_to_its_own_value() {
         let all = list(&ParameterValues::default());
-        for parameter in Parameter::ALL {
-            let name = parameter.name();
-            let is_per_collider = parameter.info().is_per_collider;
+        for info in PARAMETERS {
+            let (name, is_per_collider) = (info.name, info.parts == Parts::Colliders);
             assert_eq!(all.iter().any(|one| one.name == name), !is_per_collider, "{name}");
             if is_per_collider {
                 continue;
@@ -181,30 +145,32 @@ mod tests {
 
     #[test]
     fn numbers_have_the_decimals_of_the_scene() {
-        let mut values = ParameterValues::default();
+        let values = ParameterValues::default();
         assert_eq!(value_of("tear_force", &values), FoxgloveValue::String(OFF.to_owned()));
-        values.tear_force = Some(0.1);
+        let mut values = values.with(Parameter::TearForce, 0.1);
         assert_eq!(value_of("tear_force", &values), FoxgloveValue::Float64(0.1));
         let gravity = [0.0, -9.81, 0.0].map(FoxgloveValue::Float64);
         assert_eq!(value_of("gravity", &values), FoxgloveValue::Array(gravity.into()));
         assert_eq!(value_of("substeps", &values), FoxgloveValue::Integer(4));
-        values.compliance.bend = Some(0.5);
+        for (parameter, part, value) in [
+            (Parameter::Compliance, Part::Kind(ConstraintKind::Bend), 0.5),
+            (Parameter::Bending, Part::Block(3), 0.25),
+        ] {
+            values.set(Setting { parameter, part, value: value.into() });
+        }
         assert_eq!(value_of("compliance.bend", &values), FoxgloveValue::Float64(0.5));
         let own = FoxgloveValue::String(OWN_OF_EACH.to_owned());
         assert_eq!(value_of("compliance", &values), own);
-        values.bending_by_block.push(BlockValue { block: 3, value: 0.25 });
         assert_eq!(value_of("bending", &values), own);
         assert_eq!(value_of("bending.3", &values), FoxgloveValue::Float64(0.25));
-        let old = list(&values);
-        values.bending_by_block.clear();
-        values.bending = Some(0.5);
-        let ended = ended_blocks(&old, &values);
+        let new = values.clone().with(Parameter::Bending, 0.5);
+        let ended = ended_blocks(&values, &new);
         let [ended] = &ended[..] else { panic!("{ended:?}") };
         assert_eq!(
             (ended.name.as_str(), &ended.value),
             ("bending.3", &Some(FoxgloveValue::Float64(0.5)))
         );
-        assert!(ended_blocks(&old[..old.len() - 1], &values).is_empty());
+        assert!(ended_blocks(&new, &new).is_empty());
     }
 
     #[test]

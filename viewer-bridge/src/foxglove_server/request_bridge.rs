@@ -13,7 +13,7 @@ use foxglove::websocket::{
     PlaybackState, SetParametersResponder, Status as LibraryStatus,
 };
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
-use sim_contract::{ParameterValues, Reason};
+use sim_contract::{Parameter as Name, ParameterValues, Reason};
 
 use super::{parameters, playback, published_command};
 use crate::message::{Command, OutcomeText, Playback, Refusal, Status, check};
@@ -114,10 +114,12 @@ impl RequestBridge {
         let old = std::mem::replace(&mut self.state().parameters, new.clone());
         let library = self.library();
         let (Some(new), Some(library)) = (new, library.as_ref()) else { return };
-        let old = old.as_ref().map(parameters::list).unwrap_or_default();
         let mut changed = parameters::list(&new);
-        changed.retain(|parameter| !old.contains(parameter));
-        changed.extend(parameters::ended_blocks(&old, &new));
+        if let Some(old) = old {
+            let listed = parameters::list(&old);
+            changed.retain(|parameter| !listed.contains(parameter));
+            changed.extend(parameters::ended_blocks(&old, &new));
+        }
         if !changed.is_empty() {
             library.publish_parameter_values(changed);
         }
@@ -213,7 +215,10 @@ impl RequestBridge {
                 Ok(command) => {
                     self.submit(sender, command, Waiting::Parameter { request, parameter });
                 }
-                Err(reason) => self.close_parameter(request, parameter, &refused_set(reason)),
+                Err(reason) => {
+                    let refused = refused_set(&parameter.name, reason);
+                    self.close_parameter(request, parameter, &refused);
+                }
             }
         }
     }
@@ -292,8 +297,13 @@ impl RequestBridge {
     }
 }
 
-fn refused_set(reason: Reason) -> OutcomeText {
-    OutcomeText::refused(None, "set", reason.into())
+/// The answer to a parameter that becomes no command.
+fn refused_set(name: &str, reason: Reason) -> OutcomeText {
+    let mut outcome = OutcomeText::refused(None, "set", reason.into());
+    if let Err(allowed) = Name::from_path(name) {
+        outcome.text = format!("{reason} (allowed: {allowed})");
+    }
+    outcome
 }
 
 /// The reason of a refusal for the user.
@@ -305,7 +315,7 @@ fn refusal_text(name: &str, outcome: &OutcomeText) -> String {
 /// The reason of a refused value. It names the parameter once: most reasons begin with the name, without a part such as
 /// `.shear`.
 fn parameter_text(name: &str, outcome: &OutcomeText) -> String {
-    let base = name.split_once('.').map_or(name, |(base, _)| base);
+    let base = Name::from_path(name).map_or(name, |(parameter, _)| parameter.name());
     match outcome.text.strip_prefix(base).filter(|rest| rest.starts_with(" accepts ")) {
         Some(range) => format!("{name}{range}"),
         None => refusal_text(name, outcome),
@@ -321,8 +331,6 @@ fn respond(responder: Responder, outcome: &OutcomeText) {
 
 #[cfg(test)]
 mod tests {
-    use sim_contract::Parameter as Name;
-
     use super::*;
 
     #[test]
@@ -336,6 +344,8 @@ mod tests {
         assert!(of_kind.starts_with("compliance.shear accepts "), "{of_kind}");
         let of_block = text("bending.7", Refusal::OutsideBlocks(Name::Bending));
         assert!(of_block.starts_with("bending.7: bending of a block accepts "), "{of_block}");
+        let renamed = refused_set("wind_drag", Reason::UnknownParameter).text;
+        assert!(renamed.contains("'wind_drag' is now called 'wind.drag'"), "{renamed}");
         assert!(text("damping", Refusal::NoNode).starts_with("damping: no node is running"));
     }
 }

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use serde::{Serialize, Serializer};
-use sim_contract::{Action, Parameter, Reason};
+use sim_contract::{Action, Parameter, Parts, Reason};
 
 use crate::limits::GRABS_PER_CLIENT_MAX;
 
@@ -18,6 +18,8 @@ pub enum Refusal {
     OutsideBlocks(Parameter),
     /// The node refused a collider for this parameter, which belongs to no collider.
     WithoutColliders(Parameter),
+    /// This parameter has another name now.
+    Renamed(Parameter),
     /// The node gave a reason that this version does not know.
     Unknown,
     /// No node runs.
@@ -68,9 +70,11 @@ impl Refusal {
         let Action::Set { parameter, block, collider, .. } = action else {
             return Self::Node(reason);
         };
-        match (reason, Parameter::from_name(parameter.as_str())) {
+        let renamed = Parameter::from_old_name(parameter.as_str());
+        match (reason, Parameter::from_name(parameter.as_str()).or(renamed)) {
+            (Reason::UnknownParameter, Some(parameter)) => Self::Renamed(parameter),
             (Reason::OutOfRange, Some(parameter))
-                if collider.is_some() && !parameter.info().is_per_collider =>
+                if collider.is_some() && parameter.info().parts != Parts::Colliders =>
             {
                 Self::WithoutColliders(parameter)
             }
@@ -89,6 +93,7 @@ impl Refusal {
             Self::OutsideRange(_) | Self::OutsideBlocks(_) | Self::WithoutColliders(_) => {
                 Reason::OutOfRange.name()
             }
+            Self::Renamed(_) => Reason::UnknownParameter.name(),
             Self::Unknown => "unknown",
             Self::NoNode => "no_node",
             Self::NoAnswer => "no_answer",
@@ -130,6 +135,9 @@ impl Refusal {
             }
             Self::WithoutColliders(parameter) => {
                 return format!("{} has no values for colliders", parameter.name()).into();
+            }
+            Self::Renamed(parameter) => {
+                return format!("the parameter is now called {}", parameter.name()).into();
             }
             Self::Unknown => "the node gave an unknown reason",
             Self::NoNode => "no node is running; start one with `sim-node run`",
@@ -258,6 +266,15 @@ mod tests {
         assert_eq!(refused("damping", Some(7), None), "damping has no values for blocks");
         assert_eq!(refused("bending", None, Some(7)), "bending has no values for colliders");
         assert_eq!(refused("restitution", None, Some(0)), "restitution accepts 0 to 1");
+        let set = Action::Set {
+            parameter: Text::cut("contact"),
+            value: ParameterValue::Off,
+            constraint_kind: None,
+            block: None,
+            collider: None,
+        };
+        let renamed = Refusal::of_action(Reason::UnknownParameter, &set);
+        assert_eq!(renamed.text("set"), "the parameter is now called contact.thickness");
         assert!(Refusal::UnknownScene.text("load").contains("sim-node scenes"));
     }
 }

@@ -50,7 +50,7 @@ impl SceneSummary {
     pub fn from_toml(text: &str) -> Option<Self> {
         let scene = Scene::from_toml(text, "").ok()?;
         Some(Self {
-            parameters: parameters(&scene),
+            parameters: scene.parameter_values(),
             surfaces: scene.colliders.iter().map(surface).collect(),
             collider_meshes: scene.collider_meshes(),
             shapes: scene.shapes().take(SHAPES_MAX).map(shape_text).collect(),
@@ -95,31 +95,10 @@ fn surface(collider: &SceneCollider) -> ColliderSurface {
     ColliderSurface { friction: collider.friction, restitution: collider.restitution }
 }
 
-fn parameters(scene: &Scene) -> ParameterValues {
-    let (solver, limits, defaults) =
-        (&scene.solver, &scene.solver.limits, ParameterValues::default());
-    let wind = scene.wind.as_ref();
-    ParameterValues {
-        gravity: scene.gravity,
-        damping: solver.damping,
-        wind_velocity: wind.map_or(defaults.wind_velocity, |wind| wind.velocity),
-        wind_drag: wind.map_or(defaults.wind_drag, |wind| wind.drag),
-        substeps: solver.substeps,
-        iterations: solver.iterations,
-        relaxation: solver.relaxation,
-        max_stretch: limits.max_stretch,
-        tear_stretch: limits.tear_stretch,
-        tear_distance: limits.tear_distance,
-        tear_force: limits.tear_force,
-        max_speed: solver.max_speed,
-        contact: scene.contact.distance(),
-        contact_friction: scene.contact.friction,
-        ..defaults
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use sim_contract::Parameter;
+
     use super::*;
 
     #[test]
@@ -145,8 +124,10 @@ mod tests {
         let summary = SceneSummary::from_toml(text).unwrap();
         assert_eq!((summary.name.as_str(), summary.up, summary.is_planar), ("a", Up::MinusY, true));
         let parameters = summary.parameters;
-        assert_eq!((parameters.gravity[1], parameters.substeps), (-1.5, 7));
-        assert_eq!((parameters.tear_force, parameters.wind_velocity[0]), (Some(20.0), 1.0));
+        assert_eq!(parameters.vector(Parameter::Gravity)[1], -1.5);
+        assert_eq!(parameters.count(Parameter::Substeps), 7);
+        assert_eq!(parameters.optional(Parameter::TearForce), Some(20.0));
+        assert_eq!(parameters.vector(Parameter::WindVelocity)[0], 1.0);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! The texts of both directions.
 
 use serde_json::{Value, json};
-use sim_contract::{ParameterValues, Reason};
+use sim_contract::{Parameter, ParameterValues, Reason};
 use viewer_bridge::message::{
     Choice, FromPage, GhostState, GhostText, Hashes, HistoryText, Level, Mark, MarkKind, Mode,
     Node, NodeState, OutcomeText, PageLimits, ParametersText, Playback, RecordingState,
@@ -24,7 +24,7 @@ fn to_page() -> Vec<ToPage> {
         text: "the constraint is already torn".to_owned(),
         state_step: None,
     };
-    let parameters = ParameterValues { tear_force: Some(20.0), ..ParameterValues::default() };
+    let parameters = ParameterValues::default().with(Parameter::TearForce, 20.0);
     vec![
         ToPage::Hello(Box::new(Welcome {
             protocol: 2,

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use bytemuck::cast_slice;
 use serde_json::{Value, json};
-use sim_contract::{ParameterValues, ParticleState, Reason, TearCause, TornConstraint};
+use sim_contract::{Parameter, ParameterValues, ParticleState, Reason, TearCause, TornConstraint};
 use tokio::runtime::Runtime;
 use viewer_bridge::limits::{CLIENTS_MAX, VISITORS_MAX};
 use viewer_bridge::message::{Command, OutcomeText, ParametersText, Playback, Status};
@@ -306,7 +306,7 @@ fn a_client_can_read_set_and_subscribe_to_parameters() {
     site.apply(sender, id, "set");
     assert!(client.text("status")["message"].as_str().unwrap().contains("dance"));
     assert_eq!(parameter(&client.text("parameterValues"), "damping"), json!(3.5));
-    site.set_parameters(ParameterValues { damping: 3.5, ..ParameterValues::default() });
+    site.set_parameters(ParameterValues::default().with(Parameter::Damping, 3.5));
     assert_eq!(parameter(&other.text("parameterValues"), "damping"), json!(3.5));
 }
 

@@ -2,7 +2,8 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { ROWS, SLIDER_STEPS, editable, hasBends, partsOf, positionOf, rangeOf, restoring, rowsOf, typedValue, unitOf, valueAt, withSurfaces } from "../js/panel/parameters.js";
+import { SLIDER_STEPS, editable, hasBends, partsOf, positionOf, rangeOf, restoring, rowsOf, typedValue, unitOf, valueAt, withSurfaces } from "../js/panel/parameters.js";
+import { ROWS } from "../js/panel/tables.js";
 import { valueOf } from "../js/net/messages.js";
 import { niceCeiling } from "../js/geometry/round.js";
 import { readable } from "../js/ui/format.js";

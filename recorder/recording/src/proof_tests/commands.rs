@@ -4,8 +4,9 @@
 use std::sync::atomic::AtomicBool;
 
 use crate::log::{LogReader, Message, OutcomeRow, parse_commands};
-use sim_contract::ActionFields;
-use sim_solver::{PARAMETERS, Scene};
+use serde_json::json;
+use sim_contract::{ActionFields, PARAMETERS, ParameterInfo};
+use sim_solver::Scene;
 
 use super::{ALL, check, rebuild, record};
 use crate::simulation::Job;
@@ -91,10 +92,10 @@ pub(super) const COMMANDS: &str = r#"
     {"step":31,"kind":"set","parameter":"gravity","value":null}
     {"step":32,"kind":"set","parameter":"damping","value":0.5}
     {"step":33,"kind":"set","parameter":"damping","value":null}
-    {"step":34,"kind":"set","parameter":"wind_velocity","value":[3,0,0]}
-    {"step":35,"kind":"set","parameter":"wind_velocity","value":null}
-    {"step":36,"kind":"set","parameter":"wind_drag","value":0.2}
-    {"step":37,"kind":"set","parameter":"wind_drag","value":null}
+    {"step":34,"kind":"set","parameter":"wind.velocity","value":[3,0,0]}
+    {"step":35,"kind":"set","parameter":"wind.velocity","value":null}
+    {"step":36,"kind":"set","parameter":"wind.drag","value":0.2}
+    {"step":37,"kind":"set","parameter":"wind.drag","value":null}
     {"step":38,"kind":"set","parameter":"substeps","value":3}
     {"step":39,"kind":"set","parameter":"iterations","value":2}
     {"step":40,"kind":"set","parameter":"relaxation","value":0.9}
@@ -113,12 +114,12 @@ pub(super) const COMMANDS: &str = r#"
     {"step":53,"kind":"set","parameter":"stiffness","value":0.5}
     {"step":54,"kind":"set","parameter":"bending","value":0.001}
     {"step":54,"kind":"set","parameter":"bending","value":0.03,"block":0}
-    {"step":55,"kind":"set","parameter":"contact","value":0.05}
-    {"step":56,"kind":"set","parameter":"contact_friction","value":0.5}
+    {"step":55,"kind":"set","parameter":"contact.thickness","value":0.05}
+    {"step":56,"kind":"set","parameter":"contact.friction","value":0.5}
     {"step":56,"kind":"set","parameter":"friction","value":0.125}
     {"step":57,"kind":"set","parameter":"friction","value":0.75,"collider":1}
     {"step":57,"kind":"set","parameter":"restitution","value":0.5,"collider":0}
-    {"step":58,"kind":"set","parameter":"contact","value":null}
+    {"step":58,"kind":"set","parameter":"contact.thickness","value":null}
     {"step":58,"kind":"follow","object":"particle","object_index":60,"path":[{"time":0,"translation":[0.5,0.5,0.8]},{"time":0.5,"translation":[0.6,0.5,0.8]}]}
     {"step":58,"kind":"follow","object":"anchor","object_index":0,"path":[{"time":0.05,"translation":[0,0.1,0]},{"time":0.1,"translation":[0,0,0],"rotation":[0,0,0.1,1]},{"time":0.15,"translation":[0,0.1,0]},{"time":0.2,"translation":[0,0,0]},{"time":0.25,"translation":[0,0,0.1]}]}
     {"step":59,"kind":"follow","object":"collider","object_index":2,"path":[{"time":1,"translation":[0,0,0.2]}]}
@@ -193,7 +194,6 @@ fn every_kind_of_command_is_recorded_verified_and_repeated_from_its_log() {
         (110, "no_effect_here"),
     ];
     assert_eq!(rejected, expected);
-    assert!(PARAMETERS.iter().all(|info| COMMANDS.contains(&format!("\"{}\"", info.name))));
     for ActionFields { kind, .. } in ActionFields::ALL.iter().filter(|row| row.kind != "unknown") {
         assert!(COMMANDS.contains(&format!("\"kind\":\"{kind}\"")), "{kind} is not proved");
     }
@@ -202,6 +202,17 @@ fn every_kind_of_command_is_recorded_verified_and_repeated_from_its_log() {
     let (again, repeated) = record(&job(&lines.join("\n")));
     assert_eq!(repeated, summary);
     assert!(again == file, "the log reproduces its recording");
+}
+
+#[test]
+fn every_parameter_is_proved() {
+    let set = |(step, info): (u64, &ParameterInfo)| {
+        let (name, value) = (info.name, info.default);
+        json!({ "step": step, "kind": "set", "parameter": name, "value": value }).to_string()
+    };
+    let lines: Vec<_> = (1..).zip(&PARAMETERS).map(set).collect();
+    let (report, _) = check(&record(&job(&lines.join("\n"))).0);
+    assert_eq!(report.verdict, Verdict::Identical, "{report}");
 }
 
 #[test]

@@ -1,5 +1,7 @@
 //! Rows that only a recording of a node has: it verifies with them, and not with wrong ones.
 
+use sim_contract::Parameter;
+
 use crate::log::{LogOptions, LogReader, LogWriter, Message};
 
 use super::commands::{COMMANDS, STEPS, job};
@@ -60,7 +62,7 @@ fn parameters_that_change_twice_before_a_step_are_compared_with_both_commands() 
         verified_job(commands, |message| match message {
             Message::Parameters(row) if row.step == 30 => {
                 let mut first = row.clone();
-                first.values.damping = damping;
+                first.values = first.values.with(Parameter::Damping, damping);
                 let first = std::iter::repeat_n(Message::Parameters(first), count);
                 first.chain([Message::Parameters(row)]).collect()
             }

@@ -4,7 +4,7 @@
 use crate::log::{
     BendColumns, ColliderBodyRow, ColliderDetails, Message, SceneColliders, TearsRow, TopologyRow,
 };
-use sim_contract::{BlockValue, ParticleFlags, PlainF32};
+use sim_contract::{BlockValue, Parameter, ParticleFlags, PlainF32};
 use sim_solver::Scene;
 
 use super::commands::{COMMANDS, SCENE, STEPS, collect, job, job_of};
@@ -240,8 +240,11 @@ fn parameters_are_recorded_at_the_start_and_after_each_change() {
         _ => None,
     });
     assert_eq!(rows[0].step, 0);
-    assert_eq!(rows[0].values.tear_force, Some(400.0));
-    let gravity = |step| rows.iter().rfind(|row| row.step <= step).unwrap().values.gravity;
+    assert_eq!(rows[0].values.optional(Parameter::TearForce), Some(400.0));
+    let gravity = |step| {
+        let row = rows.iter().rfind(|row| row.step <= step).unwrap();
+        row.values.vector(Parameter::Gravity)
+    };
     assert_eq!(gravity(29), [0.0, -9.81, 0.0]);
     assert_eq!((rows[1].step, gravity(30)), (30, [0.0, -5.0, 0.0]));
     assert_eq!(gravity(31), [0.0; 3], "off");
@@ -250,7 +253,7 @@ fn parameters_are_recorded_at_the_start_and_after_each_change() {
 
     let changed = rebuild(&file, |message| match message {
         Message::Parameters(mut row) if row.step == 32 => {
-            row.values.damping = 0.75;
+            row.values = row.values.with(Parameter::Damping, 0.75);
             Some(Message::Parameters(row))
         }
         other => Some(other),

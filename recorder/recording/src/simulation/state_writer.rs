@@ -159,10 +159,10 @@ impl StateWriter {
         step: u64,
     ) -> Result<(), WriteError> {
         let values = solver.parameter_values();
-        if !changes(&mut self.parameters, &values) {
+        if !changes(&mut self.parameters, values) {
             return Ok(());
         }
-        let row = ParametersRow { step, values };
+        let row = ParametersRow { step, values: values.clone() };
         log.write(&Message::Parameters(row), self.run.time_of_step_ns(step))
     }
 

@@ -4,9 +4,7 @@ use crate::log::{
     ColliderDetails, ColliderRow, CollidersRow, ForcesRow, Frame, Message, ParametersRow, TearsRow,
     Topic,
 };
-use sim_contract::{
-    ConstraintKind, ForceKind, ForceRow, Parameter, ParameterValue, ParameterValues, Setting,
-};
+use sim_contract::{ForceKind, ForceRow, Parameter, Part, Setting};
 use sim_solver::{Keyframe, Solver};
 
 use crate::simulation::solver_rows::{colliders_row, forces_row, newest_tears_row};
@@ -94,40 +92,27 @@ fn tear_text(row: &TearsRow, place: usize) -> String {
 
 /// Compares all parameters except the time scale, which belongs to the node.
 fn compare_parameters(recorded: &ParametersRow, solver: &Solver) -> Option<String> {
-    let time_scale = recorded.values.time_scale;
-    let simulated = ParameterValues { time_scale, ..solver.parameter_values() };
+    let time_scale = recorded.values.number(Parameter::TimeScale);
+    let simulated = solver.parameter_values().clone().with(Parameter::TimeScale, time_scale);
     let (old, new) = (recorded.values.settings(), simulated.settings());
-    let differs =
-        |place: &usize| old.get(*place).map(setting_bits) != new.get(*place).map(setting_bits);
-    let place = (0..old.len().max(new.len())).find(differs)?;
+    let is_same = |place: usize| match (old.get(place), new.get(place)) {
+        (Some(old), Some(new)) => {
+            (old.parameter, old.part) == (new.parameter, new.part)
+                && old.value.has_bits_of(&new.value)
+        }
+        _ => false,
+    };
+    let place = (0..old.len().max(new.len())).find(|place| !is_same(*place))?;
     let setting = old.get(place).or_else(|| new.get(place))?;
-    let block = setting.block.map_or_else(String::new, |block| format!(" of block {block}"));
+    let of_part = match setting.part {
+        Part::All => String::new(),
+        part => format!(" of {part}"),
+    };
     let value = |settings: &[Setting]| {
-        settings.get(place).map_or_else(|| "none".to_owned(), |one| value_text(one.value))
+        settings.get(place).map_or_else(|| "none".to_owned(), |one| one.value.to_string())
     };
     let (name, old, new) = (setting.parameter.name(), value(&old), value(&new));
-    Some(format!("/parameters: parameter {name}{block}: recorded {old}, simulated {new}"))
-}
-
-/// The parameter, the constraints to which it applies, and the bits of its value.
-fn setting_bits(
-    setting: &Setting,
-) -> (Parameter, Option<ConstraintKind>, Option<u32>, [Option<u32>; 3]) {
-    let Setting { parameter, constraint_kind, block, value } = *setting;
-    let bits = match value {
-        ParameterValue::Number(number) => [Some(number.to_bits()), None, None],
-        ParameterValue::Vector(vector) => vector.map(|axis| Some(axis.to_bits())),
-        ParameterValue::Off => [None; 3],
-    };
-    (parameter, constraint_kind, block, bits)
-}
-
-fn value_text(value: ParameterValue) -> String {
-    match value {
-        ParameterValue::Number(number) => number.to_string(),
-        ParameterValue::Vector(vector) => format!("{vector:?}"),
-        ParameterValue::Off => "off".to_owned(),
-    }
+    Some(format!("/parameters: parameter {name}{of_part}: recorded {old}, simulated {new}"))
 }
 
 /// Compares the impulses of a step.

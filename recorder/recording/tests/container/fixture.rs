@@ -190,7 +190,7 @@ fn simulate(scene: &Scene) -> Vec<Message> {
         }
         scene_step = if step == RESET || step == 0 { 0 } else { scene_step + 1 };
         if step == 0 {
-            let values = solver.parameter_values();
+            let values = solver.parameter_values().clone();
             messages.push(Message::Parameters(ParametersRow { step, values }));
         }
         if step % KEYFRAME_PERIOD == 0 || step == RESET {

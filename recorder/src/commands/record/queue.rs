@@ -23,6 +23,7 @@ const SPARE_SIZE_BYTES_MAX: usize = 2 * WAKE_SIZE_BYTES;
 
 /// One or two messages to write.
 #[derive(Debug, Clone, PartialEq)]
+#[allow(clippy::large_enum_variant, reason = "the largest row has the parameters: 416 bytes")]
 pub(crate) enum Content {
     /// Any message except those of a snapshot.
     Update(Message),

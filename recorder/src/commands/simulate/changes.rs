@@ -10,7 +10,7 @@ use recording::{
     FrameReader, LogEnd, LogReader, Message, OutcomeRow, TimedCommand, parse_commands,
     scene_to_simulate, sort_commands,
 };
-use sim_contract::{Action, KindFilter, Parameter, ParameterValue, Reason, Stop, ValueForm};
+use sim_contract::{Action, Parameter, Part, Reason, Stop};
 use sim_solver::{Keyframe, Scene, Solver};
 
 use crate::input::command_source::{COMMANDS_MAX, timed_command};
@@ -30,7 +30,7 @@ pub(super) struct Changes {
 /// `friction.2`.
 pub(super) fn parse_setting(text: &str) -> Result<TimedCommand, String> {
     const FORM: &str = "it must be STEP:PARAMETER=VALUE, such as 480:damping=0.1, \
-        480:gravity=[0,-5,0], 480:max_speed=off, 480:compliance.shear=1e-4, 480:bending.1=1e-3 or 480:friction.2=0.5";
+        480:gravity=[0,-5,0], 480:tear_force=off, 480:compliance.shear=1e-4, 480:bending.1=1e-3 or 480:friction.2=0.5";
     let (step, setting) = text.split_once(':').ok_or(FORM)?;
     let step: u64 = step.trim().parse().map_err(|_| FORM)?;
     let (parameter, value) = setting.split_once('=').ok_or(FORM)?;
@@ -38,54 +38,26 @@ pub(super) fn parse_setting(text: &str) -> Result<TimedCommand, String> {
         "off" => serde_json::Value::Null,
         value => serde_json::from_str(value).map_err(|_| FORM)?,
     };
-    let (parameter, part) = match parameter.trim().split_once('.') {
-        None => (parameter.trim(), None),
-        Some((parameter, part)) => (parameter, Some(part)),
-    };
+    let (parameter, part) = Parameter::from_path(parameter.trim())
+        .map_err(|allowed| format!("{} (allowed: {allowed})", Reason::UnknownParameter))?;
     let mut line = serde_json::json!({
-        "step": step, "kind": "set", "parameter": parameter, "value": value,
+        "step": step, "kind": "set", "parameter": parameter.name(), "value": value,
     });
-    match part.map(|part| (part, part.parse::<u32>())) {
-        None => {}
-        Some((_, Ok(index))) => {
-            let named = Parameter::from_name(parameter);
-            let is_per_collider = named.is_some_and(|one| one.info().is_per_collider);
-            line[if is_per_collider { "collider" } else { "block" }] = index.into();
-        }
-        Some((kind, Err(_))) => line["constraint_kind"] = kind.into(),
+    match part {
+        Part::All => {}
+        Part::Kind(kind) => line["constraint_kind"] = kind.name().into(),
+        Part::Block(block) => line["block"] = block.into(),
+        Part::Collider(collider) => line["collider"] = collider.into(),
     }
     let commands = parse_commands(&line.to_string(), "--set").map_err(|error| error.to_string())?;
     let command = commands.into_iter().next().ok_or(FORM)?;
-    match wrong_in_every_scene(&command.action) {
-        Some(reason) => {
-            let allowed = command.action.allowed_values(reason).unwrap_or_default();
-            Err(format!("{reason} (allowed: {allowed})"))
+    match command.action {
+        Action::Set { value, .. } if !parameter.info().accepts(value) => {
+            let allowed = parameter.info().allowed_values();
+            Err(format!("{} (allowed: {allowed})", Reason::OutOfRange))
         }
-        None => Ok(command),
+        _ => Ok(command),
     }
-}
-
-/// Returns the reason for which every scene rejects a `set`. Others depend on the scene.
-fn wrong_in_every_scene(action: &Action) -> Option<Reason> {
-    let Action::Set { parameter, value, constraint_kind, block, collider } = action else {
-        return None;
-    };
-    let Some(parameter) = Parameter::from_name(parameter.as_str()) else {
-        return Some(Reason::UnknownParameter);
-    };
-    let info = parameter.info();
-    let has_part = (collider.is_none() || info.is_per_collider)
-        && match constraint_kind {
-            Some(KindFilter::Known(_)) => info.is_per_kind,
-            Some(KindFilter::Unknown) => false,
-            None => block.is_none() || parameter == Parameter::Bending,
-        };
-    if !has_part {
-        return Some(Reason::OutOfRange);
-    }
-    let ParameterValue::Number(number) = *value else { return None };
-    let is_allowed = info.form != ValueForm::Vector && info.range.contains(number);
-    (!is_allowed).then_some(Reason::OutOfRange)
 }
 
 /// The scene, steps, states and commands of a recording.
@@ -329,7 +301,7 @@ impl GivenStates {
 
 #[cfg(test)]
 mod tests {
-    use sim_contract::ConstraintKind;
+    use sim_contract::{ConstraintKind, KindFilter};
 
     use super::*;
 
@@ -338,7 +310,7 @@ mod tests {
         let setting = parse_setting("480:damping=0.1").unwrap();
         assert_eq!(setting.step, 480);
         assert!(matches!(setting.action, Action::Set { .. }));
-        for text in ["3:gravity=[0,-5,0]", "3:max_speed=off"] {
+        for text in ["3:gravity=[0,-5,0]", "3:tear_force=off"] {
             assert_eq!(parse_setting(text).unwrap().step, 3);
         }
         for text in ["damping=0.1", "x:damping=1", "3:damping", "3:damping=a", "-1:damping=1"] {
@@ -355,11 +327,13 @@ mod tests {
         let shear = KindFilter::Known(ConstraintKind::Shear);
         assert_eq!(part("3:compliance.shear=1e-3"), (Some(shear), None, None));
         for (text, allowed) in [
-            ("3:compliance.silk=1", "for one kind or all"),
-            ("3:damping.shear=1", "no kind"),
-            ("3:damping.1=1", "no block"),
+            ("3:compliance.silk=1", "compliance.KIND"),
+            ("3:damping.shear=1", "damping, which has one value"),
+            ("3:damping.1=1", "damping, which has one value"),
             ("3:restitution.1=2", "0 to 1"),
-            ("3:friction.shear=1", "no kind"),
+            ("3:friction.shear=1", "friction.N"),
+            ("3:wind_drag=1", "is now called 'wind.drag'"),
+            ("3:max_speed=off", "a number > 0"),
         ] {
             let error = parse_setting(text).unwrap_err();
             assert!(error.contains(allowed), "{error}");

@@ -195,7 +195,7 @@ impl StateAssembler {
 
 #[cfg(test)]
 mod tests {
-    use sim_types::{Action, ParameterValues, TearCause};
+    use sim_types::{Action, Parameter, ParameterValues, TearCause};
 
     use super::*;
     use crate::messages::command::Command;
@@ -246,7 +246,7 @@ mod tests {
 
     fn add_damping(assembler: &mut StateAssembler, step: u64, damping: f32) {
         let header = ParametersHeader { run_id: RUN_ID, step, ..ParametersHeader::default() };
-        let values = ParameterValues { damping, ..ParameterValues::default() };
+        let values = ParameterValues::default().with(Parameter::Damping, damping);
         assembler.add(&Update::Parameters(&header, &values));
     }
 
@@ -291,12 +291,15 @@ mod tests {
         assembler.add(&Update::Outcome(&outcome(0, 3)));
         let first = snapshot(2, 0);
         let state = assembler.assemble(&first, &[]).unwrap();
-        assert_eq!(state.parameters.values.damping, 0.0);
+        assert_eq!(state.parameters.values.number(Parameter::Damping), 0.0);
         assert_eq!(state.changes[0], Change::Load);
         assert!(!state.changes.contains(&Change::Outcome(outcome(0, 3))));
         let second = snapshot(4, 0);
         let state = assembler.assemble(&second, &[]).unwrap();
-        assert_eq!((state.parameters.header.step, state.parameters.values.damping), (3, 3.0));
+        assert_eq!(
+            (state.parameters.header.step, state.parameters.values.number(Parameter::Damping)),
+            (3, 3.0)
+        );
         assert_eq!(state.changes.len(), 2);
         assert_eq!(state.changes[1], Change::Outcome(outcome(0, 3)));
     }
@@ -374,6 +377,9 @@ mod tests {
         add_damping(&mut assembler, 2, 3.0);
         let header = snapshot(1, 0);
         let state = assembler.assemble(&header, &[]).unwrap();
-        assert_eq!((state.parameters.header.step, state.parameters.values.damping), (2, 3.0));
+        assert_eq!(
+            (state.parameters.header.step, state.parameters.values.number(Parameter::Damping)),
+            (2, 3.0)
+        );
     }
 }

@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
-use sim_types::{BlockValue, ConstraintKind, Parameter, ParameterValue, ParameterValues, Setting};
+use sim_types::{ConstraintKind, Parameter, ParameterValue, ParameterValues, Part, Parts, Setting};
 
 /// Header of `parameters`: 24 bytes, alignment 8. The payload holds the values of all parameters.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable, ZeroCopySend)]
@@ -44,18 +44,17 @@ const _: () = assert!(size_of::<ParameterState>() == 28 && align_of::<ParameterS
 
 impl From<Setting> for ParameterState {
     fn from(setting: Setting) -> Self {
+        let (constraint_kind, block) = match setting.part {
+            Part::Kind(kind) => (kind as u32, -1),
+            Part::Block(block) => (0, i32::try_from(block).unwrap_or(i32::MAX)),
+            Part::All | Part::Collider(_) => (0, -1),
+        };
         let (form, value) = match setting.value {
             ParameterValue::Off => (0, [0.0; 3]),
             ParameterValue::Number(number) => (1, [number, 0.0, 0.0]),
             ParameterValue::Vector(vector) => (2, vector),
         };
-        Self {
-            parameter: setting.parameter as u32,
-            constraint_kind: setting.constraint_kind.map_or(0, |kind| kind as u32),
-            block: setting.block.map_or(-1, |block| i32::try_from(block).unwrap_or(i32::MAX)),
-            form,
-            value,
-        }
+        Self { parameter: setting.parameter as u32, constraint_kind, block, form, value }
     }
 }
 
@@ -63,10 +62,13 @@ impl ParameterState {
     /// Returns the parameter and its value; `None` for a parameter, kind or form of another version.
     pub fn setting(&self) -> Option<Setting> {
         let parameter = Parameter::from_number(self.parameter)?;
-        let constraint_kind = if parameter.info().is_per_kind {
-            Some(ConstraintKind::from_number(self.constraint_kind)?)
-        } else {
-            None
+        let part = match (parameter.info().parts, u32::try_from(self.block)) {
+            (Parts::Kinds, Err(_)) => {
+                Part::Kind(ConstraintKind::from_number(self.constraint_kind)?)
+            }
+            (Parts::Blocks, Ok(block)) => Part::Block(block),
+            (_, Err(_)) => Part::All,
+            (_, Ok(_)) => return None,
         };
         let value = match self.form {
             0 => ParameterValue::Off,
@@ -74,55 +76,34 @@ impl ParameterState {
             2 => ParameterValue::Vector(self.value),
             _ => return None,
         };
-        let block = match u32::try_from(self.block) {
-            Ok(_) if parameter != Parameter::Bending => return None,
-            block => block.ok(),
-        };
-        Some(Setting { parameter, constraint_kind, block, value })
+        Some(Setting { parameter, part, value })
     }
 }
 
 /// Collects the values of a message. Parameters that the message lacks have their defaults.
 pub(crate) fn to_values(states: &[ParameterState]) -> ParameterValues {
-    let mut values = ParameterValues::default();
-    let mut of_blocks = Vec::new();
-    for setting in states.iter().filter_map(ParameterState::setting) {
-        match (setting.block, setting.value) {
-            (Some(block), ParameterValue::Number(value)) => {
-                of_blocks.push(BlockValue { block, value });
-            }
-            (Some(_), _) => {}
-            (None, _) => values.set(setting),
-        }
-    }
-    // The owner sends each block once, ascending.
-    of_blocks.sort_by_key(|one| one.block);
-    of_blocks.dedup_by_key(|one| one.block);
-    values.bending_by_block = of_blocks;
-    values
+    states.iter().filter_map(ParameterState::setting).collect()
 }
 
 #[cfg(test)]
 mod tests {
-    use sim_types::PerKind;
-
     use super::*;
 
     #[test]
     fn parameters_survive_the_wire() {
-        let values = ParameterValues {
-            gravity: [0.0, -1.6, 0.5],
-            substeps: 9,
-            tear_force: Some(0.25),
-            time_scale: 0.5,
-            stiffness: PerKind { bend: Some(0.125), ..PerKind::default() },
-            bending: Some(1e-3),
-            bending_by_block: vec![
-                BlockValue { block: 0, value: 0.0 },
-                BlockValue { block: 7, value: 2e-3 },
-            ],
-            ..ParameterValues::default()
-        };
+        let mut values = ParameterValues::default()
+            .with(Parameter::Gravity, [0.0, -1.6, 0.5])
+            .with(Parameter::Substeps, 9.0)
+            .with(Parameter::TearForce, 0.25)
+            .with(Parameter::TimeScale, 0.5)
+            .with(Parameter::Bending, 1e-3);
+        for (parameter, part, value) in [
+            (Parameter::Stiffness, Part::Kind(ConstraintKind::Bend), 0.125),
+            (Parameter::Bending, Part::Block(0), 0.0),
+            (Parameter::Bending, Part::Block(7), 2e-3),
+        ] {
+            values.set(Setting { parameter, part, value: value.into() });
+        }
         let settings = values.settings();
         let states: Vec<_> = settings.into_iter().map(ParameterState::from).collect();
         assert_eq!(to_values(&states), values);

@@ -362,7 +362,7 @@ mod tests {
         let error = Attachment::open(join(&domain, CONTRACT_VERSION + 1)).unwrap_err();
         assert_eq!(
             error.to_string(),
-            "service 'sim/status' has contract version 6, but this program has 7: stop every \
+            "service 'sim/status' has contract version 7, but this program has 8: stop every \
              program of the other version, or start this one with another --domain"
         );
     }
@@ -376,8 +376,8 @@ mod tests {
         let new = Owner::create_with_version(&domain.endpoint(), CONTRACT_VERSION + 1, &EMPTY);
         let error = ServiceError::Version {
             service: "sim/status".to_owned(),
-            actual: "6".to_owned(),
-            expected: 7,
+            actual: "7".to_owned(),
+            expected: 8,
         };
         assert_eq!(new.unwrap_err(), OwnerError::Service(error));
         // Without clients, the services of the other version are gone.

@@ -1,4 +1,4 @@
-//! The tables of SERVICES.md are those of the Rust types and of the services that an owner creates. To
+//! The generated tables of SERVICES.md and README.md are those of the Rust types and of the services that an owner creates. To
 //! update them after a change: `UPDATE_GOLDEN=1 cargo test -p sim-contract --test contract page`
 
 use std::collections::BTreeMap;
@@ -15,8 +15,8 @@ use sim_contract::testing::TestDomain;
 use sim_contract::{
     ActionFields, ColliderShape, CommandOptions, ConstraintKind, ForceKind, MEMBER_CHANGES_KEPT,
     MEMBERS_MAX, MemberChangeKind, Method, OUTCOME_FLAG_CONTROL, OUTCOME_FLAG_DISCONNECTED,
-    OUTCOME_FLAG_NEW_RUN, OutcomeStatus, PARAMETERS, ParticleFlags, Ready, Reason, RestoreContents,
-    SnapshotFlags, StatusFlags, TearCause, Text, Wake,
+    OUTCOME_FLAG_NEW_RUN, OffMeaning, OutcomeStatus, PARAMETERS, ParameterInfo, ParticleFlags,
+    Ready, Reason, RestoreContents, SnapshotFlags, StatusFlags, TearCause, Text, Wake,
 };
 
 use crate::layout::layouts;
@@ -42,12 +42,33 @@ const SOURCES: [&str; 11] = [
 
 #[test]
 fn the_tables_of_the_services_page_are_those_of_the_types() {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("SERVICES.md");
+    check_page(
+        "SERVICES.md",
+        &[("services", services()), ("layouts", layout_tables()), ("numbers", number_tables())],
+    );
+}
+
+#[test]
+fn the_table_of_parameters_on_the_page_of_the_contract_is_that_of_the_types() {
+    let row = |info: &ParameterInfo| {
+        let ParameterInfo { name, unit, meaning, default, .. } = info;
+        let default = match (info.off, default) {
+            (OffMeaning::OwnOfEach, _) => "own of each".to_owned(),
+            (_, default) => default.to_string(),
+        };
+        format!("| `{name}` | {unit} | {meaning} | {} | {default} |\n", info.allowed_values())
+    };
+    let head = "| parameter | unit | meaning | allowed | default |\n|---|---|---|---|---|\n";
+    let rows: String = PARAMETERS.iter().map(row).collect();
+    check_page("README.md", &[("parameters", head.to_owned() + &rows)]);
+}
+
+/// Compares the tables of a page with the given ones, or writes them.
+fn check_page(file: &str, tables: &[(&str, String)]) {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(file);
     let committed = std::fs::read_to_string(&file).unwrap();
     let mut page = committed.clone();
-    for (name, table) in
-        [("services", services()), ("layouts", layout_tables()), ("numbers", number_tables())]
-    {
+    for (name, table) in tables {
         let start = format!("<!-- {name}: generated, see tests/contract/services_page.rs -->\n");
         let (before, rest) = page.split_once(&start).unwrap();
         let (_, after) = rest.split_once("<!-- end -->").unwrap();

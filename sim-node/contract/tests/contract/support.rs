@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use sim_contract::{
     BendState, CONTRACT_VERSION, ColliderShape, ColliderState, CollidersHeader, ConstraintState,
-    Endpoint, KeyframeHeader, Load, LoadHeader, NodeStatus, Outcome, Owner, OwnerError,
+    Endpoint, KeyframeHeader, Load, LoadHeader, NodeStatus, Outcome, Owner, OwnerError, Parameter,
     ParameterValues, ParticleState, Reason, ReceivedCommand, SnapshotHeader, TearCause,
     TearsHeader, TornConstraint, Triangle, Wake,
 };
@@ -67,7 +67,7 @@ pub(crate) fn create_owner(endpoint: &Endpoint) -> Result<Owner, OwnerError> {
 
 /// Returns the parameters from `step` on.
 pub(crate) fn parameters(step: u64) -> ParameterValues {
-    ParameterValues { damping: step as f32, ..ParameterValues::default() }
+    ParameterValues::default().with(Parameter::Damping, step as f32)
 }
 
 pub(crate) fn snapshot_header(step: u64) -> SnapshotHeader {

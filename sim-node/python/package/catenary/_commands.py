@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
-from typing import Any, Generic, Literal, TypeVar
+from typing import Any, Generic, Literal, TypeAlias, TypeVar, Union
 
 from catenary._catenary import Action
 from catenary._types import Vector
 
 Result = TypeVar("Result")
+Value: TypeAlias = Union[float, Vector, Mapping[str, float], Mapping[int, float], None]
+"""The value of a parameter: a number, three numbers, None for off, or numbers by kind, block or collider."""
 
 
 class Commands(ABC, Generic[Result]):
@@ -141,16 +143,18 @@ class Commands(ABC, Generic[Result]):
             )
         )
 
-    def set(self, **values: float | Vector | Mapping[str, float] | Mapping[int, float] | None) -> Result:
+    def set(self, values: Mapping[str, Value] | None = None, /, **named: Value) -> Result:
         """Sets parameters by name, such as `set(gravity=(0, 0, 0), damping=0.5)`. None turns one off.
 
+        A name with a dot stands in a dict: `set({"wind.drag": 0.3, "contact.friction": 0.2})`.
         `compliance` and `stiffness` take a number for all constraints, or a dict with a number for each kind,
         such as `{"shear": 0.5}`. `bending` replaces the rigidity of all bends, or with a dict that of the bends of
         some generated blocks, such as `{1: 1e-3}` for the second one. `friction` and `restitution` change all
         colliders, or with a dict some of them, such as `{2: 0.3}`. Each value is a command of its own, in the order
         given; the result is the outcome of the last command.
         """
-        actions = [action for name, value in values.items() for action in _settings(name, value)]
+        all_values = {**(values or {}), **named}
+        actions = [action for name, value in all_values.items() for action in _settings(name, value)]
         if not actions:
             raise TypeError("give at least one parameter, such as set(damping=0.5)")
         return [self._perform(action) for action in actions][-1]

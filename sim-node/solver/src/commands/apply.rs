@@ -1,13 +1,15 @@
 //! Applies actions: the only way from a command to the state.
 
-use sim_types::{Action, CLIENT_ID_END, MovedObject, Parameter, ParameterValue, Reason, Text};
+use sim_types::{
+    Action, CLIENT_ID_END, MovedObject, Parameter, ParameterValue, Part, Reason, Text,
+};
 
 use super::cut::{Sphere, Sweep};
 use super::moves::Follow;
 use super::{Grab, Push};
 use crate::contacts::bodies::driven_body::BodyMotion;
 use crate::frame::Pose;
-use crate::parameters::Target;
+use crate::parameters::part_of_command;
 use crate::solver::Solver;
 
 /// Effect of an applied action.
@@ -114,8 +116,8 @@ impl Solver {
                 return Ok(Applied::Target);
             }
             Action::Set { parameter, value, constraint_kind, block, collider } => {
-                let target = Target::new(constraint_kind, block, collider)?;
-                return self.apply_setting(parameter.as_str(), value, target);
+                let part = part_of_command(constraint_kind, block, collider)?;
+                return self.apply_setting(parameter.as_str(), value, part);
             }
             Action::Reset => {
                 self.reset();
@@ -140,9 +142,9 @@ impl Solver {
         &mut self,
         parameter: &str,
         value: ParameterValue,
-        target: Target,
+        part: Part,
     ) -> Result<Applied, Reason> {
-        self.set_for(parameter, value, target)?;
+        self.set_for(parameter, value, part)?;
         match value {
             ParameterValue::Number(scale) if parameter == Parameter::TimeScale.name() => {
                 Ok(Applied::Control(Control::TimeScale(scale)))

@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use sim_types::{Action, ParticleFlags};
+use sim_types::{Action, Affects, ParticleFlags};
 
 use super::preparation::{Plan, Prepared, Spare};
 use crate::constraints::tethers::{TetherBasis, is_root};
 use crate::contacts::pairs::ParticleContacts;
-use crate::parameters::{Affected, Parameters, Target};
+use crate::parameters::{Parameters, part_of_command};
 use crate::solver::Solver;
 use crate::state::keyframe::Keyframe;
 
@@ -21,7 +21,7 @@ impl Solver {
     /// Returns the work that another thread can do in advance for a reset, a pin, or settings that follow each other. `None`
     /// if there is little to do, if [`Self::apply`] rejects the actions, and for all other actions.
     pub fn plan(&self, actions: impl IntoIterator<Item = Action>) -> Option<Plan> {
-        let (mut parameters, mut affected) = (self.parameters.clone(), Affected::Nothing);
+        let (mut parameters, mut affected) = (self.parameters.clone(), Affects::Nothing);
         for action in actions {
             match action {
                 Action::Reset => {
@@ -31,20 +31,20 @@ impl Solver {
                 Action::Pin { particle } => return self.plan_pin(particle, true),
                 Action::Unpin { particle } => return self.plan_pin(particle, false),
                 Action::Set { parameter, value, constraint_kind, block, collider } => {
-                    let target = Target::new(constraint_kind, block, collider);
+                    let part = part_of_command(constraint_kind, block, collider);
                     // A rejected setting changes nothing.
-                    let set = target.and_then(|target| {
-                        parameters.set(parameter.as_str(), value, target, self.context())
+                    let set = part.and_then(|part| {
+                        parameters.set(parameter.as_str(), value, part, self.context())
                     });
-                    affected = affected.max(set.unwrap_or(Affected::Nothing));
+                    affected = affected.max(set.unwrap_or(Affects::Nothing));
                 }
                 _ => {}
             }
         }
-        let has_new_tethers = self.settings.has_tethers() && affected == Affected::RigidPaths;
+        let has_new_tethers = self.settings.has_tethers() && affected == Affects::RigidPaths;
         let tether_basis = has_new_tethers.then(|| self.tether_basis());
         match affected {
-            Affected::Nothing => None,
+            Affects::Nothing => None,
             _ => self.plan_for(&parameters, self.torn(), tether_basis),
         }
     }
@@ -69,9 +69,7 @@ impl Solver {
     pub fn plan_state(&self, keyframe: &Keyframe) -> Option<Plan> {
         self.check_keyframe(keyframe).ok()?;
         let tether_basis = self.settings.has_tethers().then(|| keyframe.tethers.clone());
-        let mut parameters = keyframe.parameters.clone();
-        parameters.add_surfaces(&self.initial_parameters);
-        self.plan_for(&parameters, &keyframe.torn, tether_basis)
+        self.plan_for(&keyframe.parameters, &keyframe.torn, tether_basis)
     }
 
     fn plan_for(
@@ -80,7 +78,7 @@ impl Solver {
         torn: &[u32],
         tether_basis: Option<TetherBasis>,
     ) -> Option<Plan> {
-        let has_contacts = self.particle_contacts.are_derived_from(parameters.contact_thickness);
+        let has_contacts = self.particle_contacts.are_derived_from(parameters.contact_thickness());
         let has_tethers = tether_basis
             .as_ref()
             .is_none_or(|basis| self.tethers.are_derived_from(parameters, basis));
@@ -170,16 +168,14 @@ mod tests {
     use sim_types::{ParameterValue, Text};
 
     use super::*;
-    use crate::parameters::surfaces::Surfaces;
     use crate::scene::Scene;
 
     #[test]
-    fn a_keyframe_without_surfaces_is_planned_with_the_surfaces_of_the_scene() {
+    fn a_state_is_planned_with_the_surfaces_of_its_keyframe() {
         let text = "version = 1\n[[collider]]\nshape = \"plane\"\nnormal = [0, 1, 0]\noffset = -1\nrestitution = 0.5\n[[generate]]\n\
             shape = \"cloth\"\ncolumns = 40\nrows = 40\nspacing = 0.01\n";
         let mut solver = Solver::new(&Scene::from_toml(text, "test").unwrap());
-        let (particles, mut keyframe) = (solver.particles().to_vec(), solver.keyframe());
-        keyframe.parameters.surfaces = Surfaces::default();
+        let (particles, keyframe) = (solver.particles().to_vec(), solver.keyframe());
         assert!(solver.plan_state(&keyframe).is_none(), "nothing changes");
         solver.set("restitution", ParameterValue::Off, None).unwrap();
         solver.finish_boundary();
@@ -200,7 +196,7 @@ mod tests {
             columns = 40\nrows = 40\nspacing = 0.01\n";
         let mut solver = Solver::new(&Scene::from_toml(text, "test").unwrap());
         let set = |value| Action::Set {
-            parameter: Text::cut("contact"),
+            parameter: Text::cut("contact.thickness"),
             value: ParameterValue::Number(value),
             constraint_kind: None,
             block: None,

@@ -63,7 +63,7 @@ impl Plan {
             |basis| Tethers::new(&self.model, &self.parameters, basis, self.fields.tethers);
         let tethers = self.tether_basis.clone().map(new_tethers).unwrap_or_default();
         let particle_contacts = self.contact_mode.map(|mode| {
-            let thickness = self.parameters.contact_thickness;
+            let thickness = self.parameters.contact_thickness();
             ParticleContacts::new(&self.model, mode, thickness, self.kernels)
         });
         Prepared { store, tethers, particle_contacts, model: self.model }

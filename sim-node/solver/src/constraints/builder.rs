@@ -2,7 +2,7 @@
 
 use std::cell::Cell;
 
-use sim_types::{ConstraintKind, Method, TearCause};
+use sim_types::{ConstraintKind, Method, Parameter, TearCause};
 
 use super::Constraint;
 use super::fields::ConstraintFields;
@@ -18,6 +18,10 @@ pub(crate) struct ConstraintBuilder<'a> {
     pub(crate) model: &'a Model,
     pub(crate) parameters: &'a Parameters,
     setup: Setup,
+    relaxation: f32,
+    iterations: u32,
+    /// By kind: the softness that replaces that of its constraints.
+    softness: [Option<f32>; ConstraintKind::ALL.len()],
     /// By kind: the previous stiffness, and its share per pass. The root is expensive, and most
     /// constraints have the stiffness of the one of their kind before.
     last_shares: [Cell<(f32, f32)>; ConstraintKind::ALL.len()],
@@ -36,12 +40,21 @@ pub(crate) struct Setup {
 impl<'a> ConstraintBuilder<'a> {
     pub(crate) fn new(model: &'a Model, parameters: &'a Parameters, setup: Setup) -> Self {
         let last_shares = ConstraintKind::ALL.map(|_| Cell::new((f32::NAN, f32::NAN)));
-        Self { model, parameters, setup, last_shares, last_limits: Cell::new(None) }
+        Self {
+            model,
+            parameters,
+            setup,
+            relaxation: parameters.values.number(Parameter::Relaxation),
+            iterations: parameters.values.count(Parameter::Iterations),
+            softness: parameters.values.softness(),
+            last_shares,
+            last_limits: Cell::new(None),
+        }
     }
 
     /// Number of passes in a substep.
     pub(crate) fn pass_count(&self) -> u32 {
-        self.parameters.iterations
+        self.iterations
     }
 
     /// Builds the parameters of a constraint that is not torn.
@@ -100,8 +113,8 @@ impl<'a> ConstraintBuilder<'a> {
     }
 
     fn softness(&self, constraint: Constraint) -> PassSoftness {
-        let softness = self.parameters.softness(constraint.kind, constraint.compliance);
-        let relaxation = self.parameters.relaxation;
+        let softness = self.softness[constraint.kind as usize].unwrap_or(constraint.compliance);
+        let relaxation = self.relaxation;
         match self.setup.method {
             Method::Xpbd => PassSoftness {
                 scaled_compliance: softness / (self.setup.h * self.setup.h),
@@ -120,7 +133,7 @@ impl<'a> ConstraintBuilder<'a> {
         if stiffness.to_bits() == last.to_bits() {
             return share;
         }
-        let share = stiffness_per_pass(stiffness, self.parameters.iterations);
+        let share = stiffness_per_pass(stiffness, self.iterations);
         last_share.set((stiffness, share));
         share
     }

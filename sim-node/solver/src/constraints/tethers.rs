@@ -262,11 +262,12 @@ struct Links<'a> {
 impl<'a> Links<'a> {
     fn new(model: &'a Model, parameters: &Parameters, torn: &[u32]) -> Self {
         let rigid = Softness::rigid(model.method).value();
+        let softness = parameters.values.softness();
         let mut is_link: Vec<bool> = model
             .constraints
             .iter()
             .map(|one| {
-                let softness = parameters.softness(one.kind, one.compliance);
+                let softness = softness[one.kind as usize].unwrap_or(one.compliance);
                 one.kind != ConstraintKind::Bend && softness == rigid
             })
             .collect();

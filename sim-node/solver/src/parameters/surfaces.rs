@@ -1,7 +1,7 @@
 //! The surfaces of colliders: friction and restitution, which can change while a scene runs.
 
 use serde::{Deserialize, Serialize};
-use sim_types::Parameter;
+use sim_types::{Parameter, Part, Setting};
 
 use crate::checks::Context;
 use crate::scene::definition::collider::SceneCollider;
@@ -15,8 +15,8 @@ pub(crate) struct ColliderSurface {
     pub(crate) restitution: f32,
 }
 
-/// The surface of each collider. Empty in a keyframe from before surfaces could change.
-#[derive(Debug, Default, PartialEq)]
+/// The surface of each collider.
+#[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Surfaces(Vec<ColliderSurface>);
 
 impl From<&SceneCollider> for ColliderSurface {
@@ -30,10 +30,6 @@ impl Surfaces {
         Self(colliders.iter().map(ColliderSurface::from).collect())
     }
 
-    pub(crate) fn from_all(all: Vec<ColliderSurface>) -> Self {
-        Self(all)
-    }
-
     /// By collider.
     pub(crate) fn all(&self) -> &[ColliderSurface] {
         &self.0
@@ -44,11 +40,17 @@ impl Surfaces {
         self.0.iter().any(|one| one.restitution > 0.0)
     }
 
-    /// Changes the surface of one collider, or of all.
-    pub(crate) fn set(&mut self, collider: Option<u32>, change: impl Fn(&mut ColliderSurface)) {
-        match collider {
-            Some(collider) => change(&mut self.0[collider as usize]),
-            None => self.0.iter_mut().for_each(change),
+    /// Stores a checked friction or restitution of one collider, or of all.
+    pub(crate) fn set(&mut self, setting: Setting) {
+        let surfaces = match setting.part {
+            Part::Collider(collider) => std::slice::from_mut(&mut self.0[collider as usize]),
+            _ => &mut self.0[..],
+        };
+        for surface in surfaces {
+            *match setting.parameter {
+                Parameter::Friction => &mut surface.friction,
+                _ => &mut surface.restitution,
+            } = setting.value.number().unwrap_or(0.0);
         }
     }
 
@@ -58,8 +60,7 @@ impl Surfaces {
             Parameter::Friction.info().range.contains(one.friction)
                 && Parameter::Restitution.info().range.contains(one.restitution)
         };
-        let is_of_scene = self.0.is_empty() || self.0.len() as u64 == context.size.colliders;
-        is_of_scene && self.0.iter().all(is_valid)
+        self.0.len() as u64 == context.size.colliders && self.0.iter().all(is_valid)
     }
 }
 

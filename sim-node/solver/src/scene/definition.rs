@@ -9,7 +9,7 @@ pub(crate) mod settings;
 use std::ops::Range;
 
 use serde::Serialize;
-use sim_types::{ELEMENTS_MAX, ParameterValues, STEP_WORK_MAX};
+use sim_types::{ELEMENTS_MAX, Parameter, ParameterValues, STEP_WORK_MAX};
 
 use super::fields::{At, Fields, SceneTable, print, printed};
 use super::generate::rope::Rope;
@@ -74,7 +74,7 @@ impl Scene {
             dimensions: 3,
             up: Up::default(),
             unit: "m".to_owned(),
-            gravity: ParameterValues::DEFAULT.gravity,
+            gravity: ParameterValues::DEFAULT.vector(Parameter::Gravity),
             solver: SolverSettings::default(),
             wind: None,
             contact: ContactSettings::default(),

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
-use sim_types::{ConstraintKind, Method, ParameterValues};
+use sim_types::{ConstraintKind, Method, Parameter, ParameterValues};
 
 use crate::constraints::bends::{Bend, BendShape};
 use crate::constraints::sides::TornSides;
@@ -100,7 +100,7 @@ impl EnergyMeter {
         if particles.len() != self.model.particles.len() || !self.follow(torn) {
             return None;
         }
-        let of_particles = Energy::of_particles(particles, parameters.gravity);
+        let of_particles = Energy::of_particles(particles, parameters.vector(Parameter::Gravity));
         let of_constraints = match self.model.method {
             Method::Xpbd => self.of_constraints(particles, parameters),
             Method::Pbd => 0.0,
@@ -115,7 +115,7 @@ impl EnergyMeter {
     /// The solver has another number of particles than the scene.
     pub fn measure_solver(&mut self, solver: &Solver) -> Energy {
         let torn = solver.torn().iter().copied();
-        let energy = self.measure(solver.particles(), torn, &solver.parameter_values());
+        let energy = self.measure(solver.particles(), torn, solver.parameter_values());
         let Some(energy) = energy else { unreachable!("the solver is of another scene") };
         energy
     }
@@ -140,10 +140,11 @@ impl EnergyMeter {
     }
 
     fn of_constraints(&self, particles: &[Particle], parameters: &ParameterValues) -> f64 {
+        let softness = parameters.softness();
         let constraints = self.model.constraints.iter().zip(&self.is_torn);
         let energies = constraints.filter(|(_, is_torn)| !**is_torn).map(|(constraint, _)| {
             let own = constraint.compliance;
-            let compliance = parameters.compliance.get(constraint.kind).unwrap_or(own);
+            let compliance = softness[constraint.kind as usize].unwrap_or(own);
             if compliance == 0.0 {
                 return 0.0;
             }
@@ -159,7 +160,7 @@ impl EnergyMeter {
         let bends = (0_u32..).zip(&self.model.bends);
         let whole = bends.filter(|(index, _)| self.bend_sides.is_whole(*index));
         let energies = whole.map(|(_, bend)| {
-            let rigidity = rigidity(bend, parameters);
+            let rigidity = parameters.bending(bend.block).unwrap_or(bend.rigidity);
             if rigidity == 0.0 || bend.geometry == 0.0 {
                 return 0.0;
             }
@@ -168,12 +169,6 @@ impl EnergyMeter {
         });
         energies.sum()
     }
-}
-
-/// The rigidity of a bend: that of its block, of all bends, or its own.
-fn rigidity(bend: &Bend, parameters: &ParameterValues) -> f32 {
-    let of_block = parameters.bending_by_block.iter().find(|one| Some(one.block) == bend.block);
-    of_block.map(|one| one.value).or(parameters.bending).unwrap_or(bend.rigidity)
 }
 
 /// C of a bend, less its rest value along the normal of a hinge.

@@ -4,23 +4,17 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use glam::{Quat, Vec3};
-use sim_types::{Method, ParameterValues, ParticleFlags, TearCause};
+use sim_types::{ParameterValues, ParticleFlags, SETTINGS_COUNT, TearCause};
 
 use crate::constraints::tethers::TetherBasis;
 use crate::frame::{Frame, Pose};
 use crate::motion::{MOTION_POINTS_MAX, MOTION_SIZE_BYTES_MAX, Motion, MotionState};
-use crate::parameters::Parameters;
-use crate::parameters::block_bending::BlockBending;
-use crate::parameters::surfaces::{ColliderSurface, Surfaces};
+use crate::parameters::{Parameters, SETTING_SIZE_BYTES_MAX};
 use crate::solver::Solver;
 use crate::step::drive::ActiveGrab;
 
 /// First four bytes of an encoded keyframe, little-endian. It changes with the fields below.
-const KEYFRAME_VERSION: u32 = 5;
-/// The version without the surfaces of colliders and without motions.
-const WITHOUT_SURFACES_VERSION: u32 = 4;
-/// The version that is also without the bending of blocks.
-const WITHOUT_BLOCKS_VERSION: u32 = 3;
+const KEYFRAME_VERSION: u32 = 6;
 
 /// The state beside the particles of a snapshot. Both together are the complete state after a step.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -40,8 +34,7 @@ pub struct Keyframe {
     /// Anchors and colliders that clients have moved, ascending by index.
     pub(super) moved_anchors: Vec<Moved>,
     pub(super) moved_colliders: Vec<Moved>,
-    /// The motions, begun by clients, of grab targets, anchors and colliders. Encoded behind the other fields.
-    #[serde(skip)]
+    /// The motions, begun by clients, of grab targets, anchors and colliders.
     pub(super) motions: Motions,
 }
 
@@ -103,9 +96,7 @@ pub enum KeyframeError {
     #[error("{0} bytes follow the end of the keyframe")]
     TooLong(usize),
     /// Another version wrote it.
-    #[error(
-        "keyframe version {found}; this program reads versions {WITHOUT_BLOCKS_VERSION} to {KEYFRAME_VERSION}"
-    )]
+    #[error("keyframe version {found}; this program reads version {KEYFRAME_VERSION}")]
     Version {
         /// The version in the bytes.
         found: u32,
@@ -132,10 +123,9 @@ impl Keyframe {
         self.has_grabs() || self.motions.all().any(|motion| motion.is_under_way(self.scene_step))
     }
 
-    /// Returns the parameters of a scene that uses `method`, with a time scale of 1: the pace belongs to
-    /// the node and is not part of the state.
-    pub fn parameter_values(&self, method: Method) -> ParameterValues {
-        self.parameters.values(method)
+    /// Returns the parameters, with a time scale of 1: the pace belongs to the node and is not part of the state.
+    pub fn parameter_values(&self) -> &ParameterValues {
+        &self.parameters.values
     }
 
     /// Returns the same state at another step of the scene, for the steps that change nothing else.
@@ -154,7 +144,7 @@ impl Keyframe {
             + self.tethers.size_bytes()
             + size_of_val(self.moved_anchors.as_slice())
             + size_of_val(self.moved_colliders.as_slice())
-            + self.parameters.block_bending.size_bytes()
+            + size_of_val(self.parameters.values.bending_by_block.as_slice())
             + size_of_val(self.parameters.surfaces.all())
             + self.motions.all().map(MotionState::size_bytes).sum::<usize>()
     }
@@ -165,20 +155,17 @@ impl Keyframe {
     }
 
     /// Encodes the keyframe: its version as a little-endian u32, then the fields in postcard's
-    /// encoding, the bending of each generated block, the surface of each collider, and the motions.
+    /// encoding.
     ///
     /// # Panics
     /// Never: the fields always have an encoding.
     #[allow(clippy::expect_used, reason = "encoding numbers into a growing Vec cannot fail")]
     pub fn encode(&self) -> Vec<u8> {
         let bytes = KEYFRAME_VERSION.to_le_bytes().to_vec();
-        let Parameters { block_bending, surfaces, .. } = &self.parameters;
-        let fields = (self, block_bending.used(), surfaces.all(), &self.motions);
-        postcard::to_extend(&fields, bytes).expect("numbers have an encoding")
+        postcard::to_extend(self, bytes).expect("numbers have an encoding")
     }
 
-    /// Decodes the bytes of [`Self::encode`], also those of version 4, in which colliders have the surfaces of the
-    /// scene, and of version 3, in which no block has a bending of its own either.
+    /// Decodes the bytes of [`Self::encode`].
     ///
     /// # Errors
     /// Another version wrote the bytes, or they are damaged.
@@ -186,27 +173,12 @@ impl Keyframe {
         let Some((version, fields)) = bytes.split_first_chunk() else {
             return Err(KeyframeError::TooShort(bytes.len()));
         };
-        let (keyframe, rest) = match u32::from_le_bytes(*version) {
-            KEYFRAME_VERSION => {
-                let ((keyframe, blocks, surfaces, motions), rest) =
-                    postcard::take_from_bytes(fields)?;
-                (Self { motions, ..Self::with(keyframe, blocks, surfaces) }, rest)
-            }
-            WITHOUT_SURFACES_VERSION => {
-                let ((keyframe, blocks), rest) = postcard::take_from_bytes(fields)?;
-                (Self::with(keyframe, blocks, Vec::new()), rest)
-            }
-            WITHOUT_BLOCKS_VERSION => postcard::take_from_bytes(fields)?,
-            found => return Err(KeyframeError::Version { found }),
-        };
+        let found = u32::from_le_bytes(*version);
+        if found != KEYFRAME_VERSION {
+            return Err(KeyframeError::Version { found });
+        }
+        let (keyframe, rest) = postcard::take_from_bytes(fields)?;
         if rest.is_empty() { Ok(keyframe) } else { Err(KeyframeError::TooLong(rest.len())) }
-    }
-
-    /// Adds the parts that are encoded behind the other fields.
-    fn with(mut self, blocks: Vec<Option<f32>>, surfaces: Vec<ColliderSurface>) -> Self {
-        self.parameters.block_bending = BlockBending::from_used(blocks);
-        self.parameters.surfaces = Surfaces::from_all(surfaces);
-        self
     }
 }
 
@@ -263,8 +235,8 @@ impl Solver {
         let (fixed, grab) = (index + 4, index + 10 + 12 + 5);
         let (torn, cause, moved) = (link, 1, 5 + 12 + 16);
         let (root, basis) = if self.settings.has_tethers() { (index, link) } else { (0, 0) };
-        let parameters = 2 * 12 + 4 * 4 + 2 * 5 + 9 * 5 + 10 + self.model.bent_blocks.len() * 5;
-        let surface = 2 * 4;
+        let settings = SETTINGS_COUNT + self.model.bent_blocks.len();
+        let (parameters, surface) = (2 * 10 + settings * SETTING_SIZE_BYTES_MAX, 2 * 4);
         let motions = 3 * 10 + MOTION_POINTS_MAX * MOTION_SIZE_BYTES_MAX;
         let head = 4 + 1 + 10 + 9 * 10 + parameters + motions;
         head + self.particle_count() * (fixed + grab + root)

@@ -50,7 +50,7 @@ impl Solver {
     ) -> Result<(), RestoreError> {
         self.check_state(particles, keyframe)?;
         let what = "its contact distance has too many neighbours at load";
-        let contacts = self.contacts_of_client(keyframe.parameters.contact_thickness);
+        let contacts = self.contacts_of_client(keyframe.parameters.contact_thickness());
         let contacts = contacts.map_err(|Overfull| RestoreError::Mismatch { what })?;
         if let Some(contacts) = contacts {
             self.replace_particle_contacts(contacts);
@@ -64,8 +64,7 @@ impl Solver {
         self.restore_motions(&keyframe.motions);
         self.is_put_in_place = false;
         self.parameters.clone_from(&keyframe.parameters);
-        self.parameters.block_bending.make_room_for(self.model.bent_blocks.len());
-        self.parameters.add_surfaces(&self.initial_parameters);
+        self.parameters.make_room_for(self.model.bent_blocks.len());
         self.follow_surfaces();
         self.restore_constraints(keyframe);
         self.restore_frames(keyframe);

@@ -1,5 +1,7 @@
 //! Derives the constraints of a store from the scene, the parameters and the tears.
 
+use sim_types::Affects;
+
 use super::ParticleStore;
 use super::graph::block::BLOCK_GROUPS;
 use super::layout::{Configured, Location, SceneFields};
@@ -10,7 +12,7 @@ use crate::constraints::families::Family;
 use crate::constraints::fields::ConstraintFields;
 use crate::constraints::parameters::ConstraintParameters;
 use crate::constraints::sides::TornSides;
-use crate::parameters::{Affected, Parameters};
+use crate::parameters::Parameters;
 use crate::scene::model::Model;
 
 impl ParticleStore {
@@ -25,8 +27,8 @@ impl ParticleStore {
         let affected =
             self.derived_from.as_ref().map(|from| builder.parameters.affected_since(from));
         let configured = match affected {
-            Some(Affected::Nothing) => Configured::InPlace,
-            Some(Affected::Limits) => self.configure_limits(builder, scene),
+            Some(Affects::Nothing) => Configured::InPlace,
+            Some(Affects::Limits) => self.configure_limits(builder, scene),
             _ => self.configure_all(builder, scene),
         };
         match &mut self.derived_from {
@@ -39,7 +41,7 @@ impl ParticleStore {
 
     /// Returns true if the constraints are those of these parameters.
     pub(crate) fn is_derived_from(&self, parameters: &Parameters) -> bool {
-        let is_same = |from| parameters.affected_since(from) == Affected::Nothing;
+        let is_same = |from| parameters.affected_since(from) == Affects::Nothing;
         self.derived_from.as_ref().is_some_and(is_same)
     }
 

@@ -351,11 +351,11 @@ fn a_new_rigidity_has_its_own_deflection_until_a_reset() {
     let tip = |solver: &Solver| -position(solver, 6)[1];
     assert_close("tip", cantilever.law_of_tip(1.0), tip(&solver), 0.01);
     solver.set("bending", ParameterValue::Number(0.025), None).unwrap();
-    assert_eq!(solver.parameter_values().bending, Some(0.025));
+    assert_eq!(solver.parameter_values().bending(None), Some(0.025));
     step(&mut solver, 300 * 8);
     assert_close("softer", 2.0 * cantilever.law_of_tip(1.0), tip(&solver), 0.01);
     solver.reset();
-    assert_eq!(solver.parameter_values().bending, None);
+    assert_eq!(solver.parameter_values().bending(None), None);
     step(&mut solver, 300 * 8);
     assert_close("after a reset", cantilever.law_of_tip(1.0), tip(&solver), 0.01);
 }

@@ -137,6 +137,6 @@ fn a_meter_measures_the_states_of_its_scene_only() {
     let measured = meter.measure_solver(&own);
     assert_near("two particles", 2.0 * G, measured.potential, 1e-5);
     let parameters = own.parameter_values();
-    assert_eq!(meter.measure(other.particles(), [].into_iter(), &parameters), None);
-    assert_eq!(meter.measure(own.particles(), [0].into_iter(), &parameters), None);
+    assert_eq!(meter.measure(other.particles(), [].into_iter(), parameters), None);
+    assert_eq!(meter.measure(own.particles(), [0].into_iter(), parameters), None);
 }

@@ -25,8 +25,8 @@ fn setting_a_parameter_moves_nothing_by_itself() {
     for (name, setting) in [
         ("gravity", Vector([1.0, -1.0, 0.0])),
         ("damping", Number(0.1)),
-        ("wind_velocity", Vector([9.0, 0.0, 0.0])),
-        ("wind_drag", Number(1.0)),
+        ("wind.velocity", Vector([9.0, 0.0, 0.0])),
+        ("wind.drag", Number(1.0)),
         ("substeps", Number(17.0)),
         ("iterations", Number(3.0)),
         ("relaxation", Number(1.2)),

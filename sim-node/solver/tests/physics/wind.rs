@@ -273,8 +273,8 @@ fn wind_that_rises_later_passes_through_torn_triangles() {
         solver.cut(constraint).unwrap();
     }
     step(&mut solver, 3);
-    solver.set("wind_velocity", sim_solver::ParameterValue::Vector([0.0, 0.0, 2.0]), None).unwrap();
-    solver.set("wind_drag", sim_solver::ParameterValue::Number(1.0), None).unwrap();
+    solver.set("wind.velocity", sim_solver::ParameterValue::Vector([0.0, 0.0, 2.0]), None).unwrap();
+    solver.set("wind.drag", sim_solver::ParameterValue::Number(1.0), None).unwrap();
     step(&mut solver, 10);
     assert!((0..4).all(|one| velocity(&solver, one) == [0.0; 3]));
 }
@@ -286,8 +286,8 @@ fn a_scene_without_wind_has_no_air() {
     let mut calm = solver(text);
     step(&mut calm, 10);
     assert_eq!(velocity(&calm, 0), [0.0; 3]);
-    calm.set("wind_velocity", sim_solver::ParameterValue::Vector([0.0, 0.0, 2.0]), None).unwrap();
-    calm.set("wind_drag", sim_solver::ParameterValue::Number(1.0), None).unwrap();
+    calm.set("wind.velocity", sim_solver::ParameterValue::Vector([0.0, 0.0, 2.0]), None).unwrap();
+    calm.set("wind.drag", sim_solver::ParameterValue::Number(1.0), None).unwrap();
     step(&mut calm, 10);
     assert!(velocity(&calm, 0)[2] > 0.0);
 }

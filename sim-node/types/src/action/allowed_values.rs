@@ -2,38 +2,13 @@
 
 use crate::action::Action;
 use crate::limits::STEP_WORK_MAX;
-use crate::parameter::{
-    OffMeaning, PARAMETERS, Parameter, ParameterInfo, ParameterValue, ValueForm,
-};
+use crate::parameter::{OffMeaning, Parameter, ParameterValue, Parts};
 use crate::reason::Reason;
-use crate::suggestion::nearest;
 use crate::text::Text;
 
 /// Allowed contact distances, where the rejected distance is a number > 0. The solver has the limits.
 const TOO_MANY_NEIGHBOURS: &str =
     "a smaller distance: at load, particles have too many neighbours within this one";
-
-impl ParameterInfo {
-    /// Returns the allowed values in words.
-    pub fn allowed_values(&self) -> String {
-        let values = match self.form {
-            ValueForm::Vector => format!("three numbers, each {}, z 0 in 2-D", self.range.text),
-            ValueForm::Number | ValueForm::Whole => self.range.text.to_owned(),
-        };
-        let off = match self.off {
-            OffMeaning::Zero => ", or off for 0",
-            OffMeaning::NoLimit => ", or off for no limit",
-            OffMeaning::Absent => ", or off for none",
-            OffMeaning::NotAllowed | OffMeaning::OwnOfEach => "",
-        };
-        let part = match self {
-            Self { is_per_kind: true, .. } => ", for one kind or all",
-            Self { is_per_collider: true, .. } => ", for one collider or all",
-            _ => "",
-        };
-        format!("{values}{off}{part}")
-    }
-}
 
 impl Action {
     /// Returns the values that this action may have, in words, if it was rejected for its values alone.
@@ -44,20 +19,11 @@ impl Action {
                 Some("finite numbers, or off for no limit".to_owned())
             }
             Reason::NonFinite => Some("finite numbers".to_owned()),
-            Reason::UnknownParameter => Some(self.known_parameters()),
+            Reason::UnknownParameter => match self {
+                Self::Set { parameter, .. } => Some(Parameter::allowed_names(parameter.as_str())),
+                _ => None,
+            },
             _ => None,
-        }
-    }
-
-    /// Returns the names of all parameters, and the one that the name in this action most likely stands for.
-    fn known_parameters(&self) -> String {
-        let names = PARAMETERS.map(|info| info.name);
-        let all = names.join(", ");
-        let Self::Set { parameter, .. } = self else { return all };
-        // Callers put these words in parentheses, so they have none.
-        match nearest(parameter.as_str(), names) {
-            Some(name) => format!("{all}; did you mean '{name}'?"),
-            None => all,
         }
     }
 
@@ -66,7 +32,8 @@ impl Action {
     pub fn missing_condition(&self) -> Option<&'static str> {
         let is_bending = |parameter: &Text| parameter.as_str() == Parameter::Bending.name();
         let is_per_collider = |parameter: &Text| {
-            Parameter::from_name(parameter.as_str()).is_some_and(|one| one.info().is_per_collider)
+            Parameter::from_name(parameter.as_str())
+                .is_some_and(|one| one.info().parts == Parts::Colliders)
         };
         match self {
             Self::Set { parameter, block: Some(_), .. } if is_bending(parameter) => Some(
@@ -108,18 +75,18 @@ impl Action {
         let values = match self {
             Self::Set { parameter, value, constraint_kind, block, collider } => {
                 let info = Parameter::from_name(parameter.as_str())?.info();
-                let has_kind = constraint_kind.is_some() && !info.is_per_kind;
+                let has_kind = constraint_kind.is_some() && info.parts != Parts::Kinds;
                 let kind = if has_kind { ", no kind" } else { "" };
                 let block = match block {
-                    Some(_) if info.parameter == Parameter::Bending => {
+                    Some(_) if info.parts == Parts::Blocks => {
                         ", for a generated block of the scene, counted from 0"
                     }
                     Some(_) => ", no block",
                     None => "",
                 };
-                let has_collider = collider.is_some() && !info.is_per_collider;
+                let has_collider = collider.is_some() && info.parts != Parts::Colliders;
                 let collider = if has_collider { ", no collider" } else { "" };
-                if let (Parameter::Contact, ParameterValue::Number(number)) =
+                if let (Parameter::ContactThickness, ParameterValue::Number(number)) =
                     (info.parameter, value)
                     && info.range.contains(*number)
                     && kind.len() + block.len() + collider.len() == 0
@@ -183,19 +150,10 @@ mod tests {
     use crate::{ConstraintKind, KindFilter, ParameterValue, Text};
 
     #[test]
-    fn the_allowed_values_name_range_off_and_kind() {
-        let text = |parameter: Parameter| parameter.info().allowed_values();
-        assert_eq!(text(Parameter::Substeps), "a whole number from 1 to 1000");
-        assert_eq!(text(Parameter::TearForce), "a number > 0, or off for no limit");
-        assert_eq!(text(Parameter::Stiffness), "0 to 1, for one kind or all");
-        let gravity = "three numbers, each -1e7 to 1e7, z 0 in 2-D, or off for 0";
-        assert_eq!(text(Parameter::Gravity), gravity);
-    }
-
-    #[test]
     fn a_contact_distance_in_its_range_has_too_many_neighbours() {
         let values = |number| {
-            let (parameter, value) = (Text::cut("contact"), ParameterValue::Number(number));
+            let (parameter, value) =
+                (Text::cut("contact.thickness"), ParameterValue::Number(number));
             let action = Action::Set {
                 parameter,
                 value,
@@ -220,17 +178,6 @@ mod tests {
         };
         let values = action.allowed_values(Reason::OutOfRange).unwrap();
         assert_eq!(values, "a number >= 0, or off for 0, no kind");
-    }
-
-    #[test]
-    fn a_misspelt_parameter_is_answered_with_the_nearest_one() {
-        let parameter = Text::cut("gravty");
-        let value = ParameterValue::Number(1.0);
-        let action =
-            Action::Set { parameter, value, constraint_kind: None, block: None, collider: None };
-        let values = action.allowed_values(Reason::UnknownParameter).unwrap();
-        assert!(values.starts_with("gravity, damping, "), "{values}");
-        assert!(values.ends_with("; did you mean 'gravity'?"), "{values}");
     }
 
     #[test]

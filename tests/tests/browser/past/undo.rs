@@ -2,6 +2,7 @@
 
 use integration_tests::{DEADLINE, ctl, wait_for};
 use serde_json::json;
+use sim_contract::Parameter;
 
 use crate::browser::support::{Button, Rig, State};
 
@@ -64,7 +65,8 @@ fn ctrl_z_undoes_a_stroke_of_cuts_and_a_reset_one_after_the_other() {
 #[ignore = "needs Chromium"]
 fn ctrl_z_in_the_field_of_a_parameter_undoes_typing_first_and_then_the_change_of_the_node() {
     let mut rig = Rig::new(&["curtain"], "");
-    let initial = rig.client().parameters(DEADLINE).unwrap().unwrap().values.damping;
+    let initial = rig.client().parameters(DEADLINE).unwrap().unwrap().values;
+    let initial = initial.number(Parameter::Damping);
     let field = "input[aria-label='Damping in 1/s']";
     let shows = |rig: &Rig, text: &str| {
         rig.tab.wait(&format!("document.querySelector(\"{field}\").value === '{text}'"));
@@ -80,7 +82,8 @@ fn ctrl_z_in_the_field_of_a_parameter_undoes_typing_first_and_then_the_change_of
     rig.tab.ctrl_key('z');
     shows(&rig, &initial.to_string());
     wait_for("the value of the scene in the node", || {
-        (rig.client().parameters(DEADLINE).unwrap().unwrap().values.damping == initial)
+        (rig.client().parameters(DEADLINE).unwrap().unwrap().values.number(Parameter::Damping)
+            == initial)
             .then_some(())
     });
 }

@@ -49,7 +49,7 @@ impl Known {
         match message {
             Message::Tears(row) => self.torn.extend(&row.constraints),
             Message::Colliders(row) => self.colliders = row.states(),
-            Message::Parameters(row) => self.parameters = row.values.clone(),
+            Message::Parameters(row) => self.parameters.clone_from(&row.values),
             Message::Outcome(row) => self.outcomes.push((row.step, row.index)),
             _ => {}
         }
@@ -129,7 +129,7 @@ fn played(sandbox: &Sandbox, files: &[String]) -> Vec<Known> {
             known.torn_count = state.header.torn_count as usize;
             known.torn = state.torn.indices().collect();
             known.colliders.clone_from(&state.colliders.colliders);
-            known.parameters = state.parameters.values.clone();
+            known.parameters.clone_from(&state.parameters.values);
             known.outcomes.extend(state.changes.iter().filter_map(|change| match change {
                 Change::Outcome(outcome) => Some((outcome.step, outcome.index)),
                 _ => None,

@@ -64,7 +64,7 @@ fn apply(frame: &Frame, torn: &mut Vec<u32>, parameters: &mut ParameterValues) {
     for update in &frame.updates {
         match update {
             Message::Tears(row) => torn.extend(&row.constraints),
-            Message::Parameters(row) => *parameters = row.values.clone(),
+            Message::Parameters(row) => parameters.clone_from(&row.values),
             _ => {}
         }
     }

@@ -54,6 +54,7 @@ pub(super) const FILES: &[(&str, &[u8])] = files![
     "js/panel/plot.js",
     "js/panel/selection-plots.js",
     "js/panel/series.js",
+    "js/panel/tables.js",
     "js/panel/value-field.js",
     "js/save/composition.js",
     "js/save/legend-art.js",

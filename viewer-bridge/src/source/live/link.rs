@@ -6,7 +6,7 @@ use std::time::Duration;
 use recording::{StatusRow, StepRow};
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{
-    AttachError, Client, Endpoint, NodeStatus, ParameterValues, SnapshotFlags, Tap,
+    AttachError, Client, Endpoint, NodeStatus, Parameter, ParameterValues, SnapshotFlags, Tap,
 };
 
 use super::carrier::{Carrier, Place};
@@ -412,7 +412,8 @@ impl Link {
             return;
         }
         if let (Some(status), Some(state)) = (&self.status, self.newest.get()) {
-            let gravity = self.parameters.as_ref().map_or([0.0; 3], |values| values.gravity);
+            let gravity = self.parameters.as_ref();
+            let gravity = gravity.map_or([0.0; 3], |values| values.vector(Parameter::Gravity));
             let statistics = statistics(status, state, shown, gravity);
             sinks.publish(&Update::Statistics(&statistics));
         }

@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use sim_contract::testing::TestDomain;
 use sim_contract::{
     Action, COMMANDS_BUFFERED, ColliderState, CollidersHeader, Command as Sent, ConstraintState,
-    ForceRow, ForcesHeader, Load as OwnerLoad, LoadHeader, NodeStatus, Outcome, Owner,
+    ForceRow, ForcesHeader, Load as OwnerLoad, LoadHeader, NodeStatus, Outcome, Owner, Parameter,
     ParameterValues, ParticleState, SnapshotHeader, TearsHeader, TornConstraint,
 };
 
@@ -242,7 +242,7 @@ fn published_parameters_take_effect_at_once_and_keep_the_initial_values() {
     let mut fixture = Fixture::start();
     let parameters = fixture.page_parameters();
     assert_eq!(parameters["values"]["damping"], 0.0);
-    let values = ParameterValues { damping: 1.5, ..ParameterValues::default() };
+    let values = ParameterValues::default().with(Parameter::Damping, 1.5);
     fixture.owner.publish_parameters(RUN_ID, 1, &values).unwrap();
     fixture.read();
     let parameters = fixture.page_parameters();

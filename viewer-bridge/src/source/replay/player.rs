@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use recording::{ReadError, TapeError, TapeState};
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
-use sim_contract::{Forces, ForcesHeader, ParameterValues, Reason};
+use sim_contract::{Forces, ForcesHeader, Parameter, Reason};
 
 use super::check::Report;
 use super::ghosts::Ghosts;
@@ -305,7 +305,7 @@ impl<'a> Player<'a> {
         let values = recorded.unwrap_or_else(|| initial.clone());
         let text = ParametersText {
             is_complete,
-            values: Some(ParameterValues { time_scale: self.playhead.rate, ..values }),
+            values: Some(values.with(Parameter::TimeScale, self.playhead.rate)),
             initial: Some(initial),
             initial_colliders: self.recording.load.summary.surfaces.clone(),
         };
@@ -394,7 +394,7 @@ impl<'a> Player<'a> {
         }
         if self.sinks.has_demand(Demand::Statistics) {
             let values = self.parameters.as_ref().and_then(|text| text.values.as_ref());
-            let gravity = values.map_or([0.0; 3], |values| values.gravity);
+            let gravity = values.map_or([0.0; 3], |values| values.vector(Parameter::Gravity));
             let (state, shown, playhead) = (&self.state, &self.shown, &self.playhead);
             let statistics = statistics(self.recording, state, shown, playhead, gravity);
             self.sinks.publish(&Update::Statistics(&statistics));

@@ -93,7 +93,7 @@ export class SceneBuffers {
   /** The radii of ropes and limbs. */
   radii() {
     const { parameters } = this.simulation;
-    const contact = parameters?.initial?.contact ?? null;
+    const contact = parameters?.initial?.["contact.thickness"] ?? null;
     return bodyRadii(this.scene, { contact: typeof contact === "number" ? contact : null, sceneRadius: this.simulation.radius() });
   }
 

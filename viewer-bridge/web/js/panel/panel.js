@@ -172,7 +172,7 @@ export class Panel {
       const vector = read();
       vector[axis] = value ?? 0;
       this.set(row.name, vector);
-      if (row.name === "wind_velocity" && !valueOf(simulation.parameters?.values ?? null, "wind_drag", "")) this.set("wind_drag", WIND_DRAG);
+      if (row.name === "wind.velocity" && !valueOf(simulation.parameters?.values ?? null, "wind.drag", "")) this.set("wind.drag", WIND_DRAG);
     };
     const fields = AXES.map((axis, index) => this.valueField(row, `${row.label} ${axis} in ${this.unit(row)}`, (value) => setAxis(index, value)));
     sliders.forEach((slider, axis) => slider.addEventListener("input", () => {
@@ -199,7 +199,7 @@ export class Panel {
   /** A row with a slider and its value, a switch if the parameter can be off, and a choice of the part if it has parts. @param {Row} row */
   numberRow(row) {
     const { simulation } = this;
-    const slider = make("input", { type: "range", min: 0, max: SLIDER_STEPS, id: `set-${row.name}` });
+    const slider = make("input", { type: "range", min: 0, max: SLIDER_STEPS, id: `set-${row.name.replace(".", "-")}` });
     const parts = partsOf(row, simulation.scene ?? NO_BENDS, KINDS, simulation.colliders);
     const options = [{ part: "all", text: "all" }, ...parts].map(({ part, text }) => make("option", { value: part }, text));
     const choice = make("select", { "aria-label": `${row.label}: ${row.parts === "kinds" ? "constraint kind" : row.parts === "blocks" ? "shape" : "collider"}` }, ...options);

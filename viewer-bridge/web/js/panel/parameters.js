@@ -3,42 +3,14 @@
 
 import { niceCeiling } from "../geometry/round.js";
 import { blockValues, toNumber, valueOf } from "../net/messages.js";
+import { ROWS } from "./tables.js";
 
 /** @typedef {import("../net/messages.js").Values} Values */
 /** @typedef {import("../net/messages.js").ParameterValue} ParameterValue */
-/**
- * A row of the panel. A "log" slider is logarithmic, and starts with 0 if `hasZero`. `whenOn` is the value
- * of a parameter when it is switched on. A row with `parts` has a value for all constraints or bends, or for those of a part: a
- * kind of constraint, a generated block with bends, or a collider. Without a value, each has its own.
- * @typedef {{
- *   name: string, label: string, unit: string, kind: "vector" | "linear" | "log" | "whole",
- *   least: number, most: number, canBeOff?: boolean, hasZero?: boolean, whenOn?: number, method?: "xpbd" | "pbd", parts?: "kinds" | "blocks" | "colliders",
- * }} Row
- */
+/** @typedef {import("./tables.js").Row} Row */
 
 /** Number of intervals of a slider. */
 export const SLIDER_STEPS = 400;
-
-/** The rows, in units of a scene in metres. The values of a scene can widen a range. @type {Row[]} */
-export const ROWS = [
-  { name: "gravity", label: "Gravity", unit: "m/s²", kind: "vector", least: -20, most: 20 },
-  { name: "wind_velocity", label: "Wind", unit: "m/s", kind: "vector", least: -20, most: 20 },
-  { name: "wind_drag", label: "Wind drag", unit: "kg/m³", kind: "linear", least: 0, most: 2, canBeOff: true, whenOn: 0.6 },
-  { name: "damping", label: "Damping", unit: "1/s", kind: "linear", least: 0, most: 5 },
-  { name: "compliance", label: "Compliance", unit: "m/N", kind: "log", least: 1e-8, most: 10, hasZero: true, method: "xpbd", parts: "kinds" },
-  { name: "stiffness", label: "Stiffness", unit: "", kind: "linear", least: 0, most: 1, method: "pbd", parts: "kinds" },
-  { name: "bending", label: "Bending", unit: "N m", kind: "log", least: 1e-7, most: 10, hasZero: true, parts: "blocks" },
-  { name: "iterations", label: "Iterations", unit: "", kind: "whole", least: 1, most: 32 },
-  { name: "substeps", label: "Substeps", unit: "", kind: "whole", least: 1, most: 32 },
-  { name: "tear_force", label: "Tear force", unit: "N", kind: "log", least: 1e-3, most: 1e5, canBeOff: true, whenOn: 50 },
-  { name: "tear_stretch", label: "Tear stretch", unit: "×", kind: "linear", least: 1.01, most: 4, canBeOff: true, whenOn: 1.5 },
-  { name: "tear_distance", label: "Tear distance", unit: "m", kind: "log", least: 1e-3, most: 100, canBeOff: true, whenOn: 0.1 },
-  { name: "contact", label: "Contact distance", unit: "m", kind: "log", least: 1e-3, most: 1, canBeOff: true, whenOn: 0.02 },
-  { name: "contact_friction", label: "Contact friction", unit: "", kind: "linear", least: 0, most: 2 },
-  { name: "friction", label: "Collider friction", unit: "", kind: "linear", least: 0, most: 2, parts: "colliders" },
-  { name: "restitution", label: "Collider bounce", unit: "", kind: "linear", least: 0, most: 1, parts: "colliders" },
-  { name: "time_scale", label: "Speed", unit: "×", kind: "log", least: 0.01, most: 10 },
-];
 
 /** The bends of a scene, as its shapes tell. @typedef {{ shapes: { shape: string, has_bends?: boolean }[], hasExplicitBends: boolean }} Bends */
 /** A collider with its surface. @typedef {{ index: number, shape?: string, friction: number, restitution: number }} Surface */

@@ -77,7 +77,7 @@ function roomyBox(simulation) {
 
 /** True for cloth on a pole in a scene with wind. @param {import("./simulation.js").Simulation} simulation */
 function isFlag(simulation) {
-  const wind = simulation.parameters?.initial?.wind_velocity;
+  const wind = simulation.parameters?.initial?.["wind.velocity"];
   return Array.isArray(wind) && wind.some((axis) => axis !== 0) && polesOf(simulation).length > 0;
 }
 

@@ -84,7 +84,7 @@ test("the first view of a flag has no room for hanging while the wind blows", ()
   const simulation = sheet([0, 3, 6]);
   simulation.lowest = -1;
   assert.equal(firstViewBox(simulation).min[1], -1);
-  simulation.parameters = { initial: { wind_velocity: [5, 0, 0] } };
+  simulation.parameters = { initial: { "wind.velocity": [5, 0, 0] } };
   assert.ok(firstViewBox(simulation).min[1] > 0.9);
   // A curtain in the wind still hangs.
   const curtain = sheet([0, 1, 2]);

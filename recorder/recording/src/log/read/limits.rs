@@ -170,8 +170,8 @@ mod tests {
         let tears = TearsRow::new(u64::MAX, &torn);
         let surface = SurfaceRow { step: 0, triangles: vec![index; 3 * 2 * count] };
         let blocks = (0..500).map(|block| BlockValue { block: index - 500 + block, value: number });
-        let values =
-            ParameterValues { bending_by_block: blocks.collect(), ..ParameterValues::default() };
+        let mut values = ParameterValues::default();
+        values.bending_by_block.extend(blocks);
         let parameters = ParametersRow { step: u64::MAX, values };
         let limits =
             SizeLimits { bend_count: count as u64, ..limits(count as u64, count as u64, 500 * 30) };

@@ -1,8 +1,13 @@
 //! The row of `/parameters`.
 
-use schemars::JsonSchema;
+use std::borrow::Cow;
+
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
-use sim_contract::ParameterValues;
+use serde_json::Map;
+use sim_contract::{
+    ConstraintKind, OffMeaning, PARAMETERS, ParameterInfo, ParameterValues, Parts, ValueForm,
+};
 
 /// The values of all parameters, at the start and after each change.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -15,29 +20,43 @@ pub struct ParametersRow {
     pub values: ParameterValues,
 }
 
-/// The schema of the values, because [`ParameterValues`] does not depend on schemars.
-#[derive(JsonSchema)]
-#[allow(dead_code, reason = "only its schema is used")]
-struct ValuesSchema {
-    gravity: [f32; 3],
-    damping: f32,
-    wind_velocity: [f32; 3],
-    wind_drag: f32,
-    substeps: u32,
-    iterations: u32,
-    relaxation: f32,
-    max_stretch: Option<f32>,
-    tear_stretch: Option<f32>,
-    tear_distance: Option<f32>,
-    tear_force: Option<f32>,
-    max_speed: f32,
-    time_scale: f32,
-    compliance: PerKindSchema,
-    stiffness: PerKindSchema,
-    contact: Option<f32>,
-    contact_friction: f32,
-    bending: Option<f32>,
-    bending_by_block: Vec<BlockValueSchema>,
+/// The schema of the values, from the table of parameters.
+struct ValuesSchema;
+
+impl JsonSchema for ValuesSchema {
+    fn schema_name() -> Cow<'static, str> {
+        "ParameterValues".into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        let number = generator.subschema_for::<f32>();
+        let optional = generator.subschema_for::<Option<f32>>();
+        let kinds = ConstraintKind::ALL.map(|kind| (kind.name().to_owned(), optional.clone()));
+        let kinds = object(kinds.into());
+        let of_parameter = |info: &ParameterInfo| {
+            let schema = match (info.parts, info.form, info.off) {
+                (Parts::Colliders, ..) => return None,
+                (Parts::Kinds, ..) => kinds.clone(),
+                (_, ValueForm::Vector, _) => generator.subschema_for::<[f32; 3]>(),
+                (_, ValueForm::Whole, _) => generator.subschema_for::<u32>(),
+                (_, _, OffMeaning::NotAllowed | OffMeaning::Zero) => number.clone(),
+                _ => optional.clone(),
+            };
+            Some((info.name.to_owned(), schema))
+        };
+        let mut properties: Vec<_> = PARAMETERS.iter().filter_map(of_parameter).collect();
+        let blocks = generator.subschema_for::<Vec<BlockValueSchema>>();
+        properties.push(("bending_by_block".to_owned(), blocks));
+        object(properties)
+    }
+}
+
+/// An object with all these properties.
+fn object(properties: Vec<(String, Schema)>) -> Schema {
+    let names: Vec<_> = properties.iter().map(|(name, _)| name.clone()).collect();
+    let properties: Map<_, _> =
+        properties.into_iter().map(|(name, schema)| (name, schema.to_value())).collect();
+    json_schema!({ "type": "object", "properties": properties, "required": names })
 }
 
 /// The schema of a value for one generated block.
@@ -48,31 +67,19 @@ struct BlockValueSchema {
     value: f32,
 }
 
-/// The schema of a value for each kind of constraint. `null` means that each constraint has its own.
-#[derive(JsonSchema)]
-#[allow(dead_code, reason = "only its schema is used")]
-struct PerKindSchema {
-    structural: Option<f32>,
-    shear: Option<f32>,
-    bend: Option<f32>,
-    tether: Option<f32>,
-}
-
 #[cfg(test)]
 mod tests {
-    use sim_contract::BlockValue;
+    use sim_contract::{BlockValue, Parameter};
 
     use super::*;
 
     #[test]
     fn parameters_survive_a_round_trip_through_json_bit_for_bit() {
-        let values = ParameterValues {
-            gravity: [0.1, -9.81, 1e-40],
-            tear_force: Some(0.3),
-            max_speed: f32::INFINITY,
-            bending_by_block: vec![BlockValue { block: 3, value: 0.1 }],
-            ..ParameterValues::default()
-        };
+        let mut values = ParameterValues::default()
+            .with(Parameter::Gravity, [0.1, -9.81, 1e-40])
+            .with(Parameter::TearForce, 0.3)
+            .with(Parameter::MaxSpeed, f32::INFINITY);
+        values.bending_by_block.push(BlockValue { block: 3, value: 0.1 });
         let row = ParametersRow { step: 12, values };
         let text = serde_json::to_string(&row).unwrap();
         assert!(

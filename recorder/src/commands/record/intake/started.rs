@@ -408,7 +408,8 @@ impl Started {
         counts[Topic::Particles].gaps = self.state_gaps;
         counts[Topic::Steps].gaps = self.state_gaps;
         counts[Topic::Outcomes].gaps += self.last.outcome_count.saturating_sub(self.next_outcome);
-        counts[Topic::Tears].gaps += u64::from(self.last.torn_count.saturating_sub(self.torn_count));
+        counts[Topic::Tears].gaps +=
+            u64::from(self.last.torn_count.saturating_sub(self.torn_count));
         counts[Topic::Parameters].gaps = lost.parameters - self.lost_before.parameters;
         counts
     }

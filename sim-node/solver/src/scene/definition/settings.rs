@@ -94,18 +94,17 @@ pub struct SolverSettings {
 
 impl Default for SolverSettings {
     fn default() -> Self {
-        let ParameterValues { substeps, iterations, relaxation, damping, max_speed, .. } =
-            ParameterValues::DEFAULT;
+        let defaults = ParameterValues::DEFAULT;
         Self {
             rate_hz: 240,
-            substeps,
-            iterations,
+            substeps: defaults.count(Parameter::Substeps),
+            iterations: defaults.count(Parameter::Iterations),
             method: Method::Xpbd,
             order: ConstraintOrder::Grouped,
-            damping,
-            relaxation,
+            damping: defaults.number(Parameter::Damping),
+            relaxation: defaults.number(Parameter::Relaxation),
             tethers: 0,
-            max_speed,
+            max_speed: defaults.number(Parameter::MaxSpeed),
             limits: Limits::default(),
         }
     }
@@ -197,7 +196,7 @@ pub struct ContactSettings {
 
 impl Default for ContactSettings {
     fn default() -> Self {
-        let friction = ParameterValues::DEFAULT.contact_friction;
+        let friction = ParameterValues::DEFAULT.number(Parameter::ContactFriction);
         Self { mode: ContactMode::Off, thickness: None, friction }
     }
 }
@@ -218,7 +217,11 @@ impl SceneTable for ContactSettings {
     fn fields(&mut self, fields: &mut Fields<'_>) {
         let range = |parameter: Parameter| parameter.info().range;
         fields.word("mode", &mut self.mode, &ContactMode::NAMES);
-        fields.optional_number("thickness", &mut self.thickness, range(Parameter::Contact));
+        fields.optional_number(
+            "thickness",
+            &mut self.thickness,
+            range(Parameter::ContactThickness),
+        );
         fields.number("friction", &mut self.friction, range(Parameter::ContactFriction));
     }
 }

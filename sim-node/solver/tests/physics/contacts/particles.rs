@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use sim_solver::{ParameterValue, Reason, RestoreError, Solver};
+use sim_solver::{Parameter, ParameterValue, Reason, RestoreError, Solver};
 
 use super::super::{assert_at_most, assert_near, rates, solver, step, stepped};
 use super::cloths::{
@@ -193,11 +193,12 @@ fn a_contact_distance_with_too_many_neighbours_at_load_is_refused_and_changes_no
         };
         let mut solver = solver(&text(""));
         step(&mut solver, 2);
-        let before = (solver.particles().to_vec(), solver.parameter_values());
-        let mut set = |thickness| solver.set("contact", ParameterValue::Number(thickness), None);
+        let before = (solver.particles().to_vec(), solver.parameter_values().clone());
+        let mut set =
+            |thickness| solver.set("contact.thickness", ParameterValue::Number(thickness), None);
         assert_eq!(set(0.2), Err(Reason::OutOfRange), "{mode}");
         assert_eq!(set(1e6), Err(Reason::OutOfRange), "{mode}");
-        assert_eq!((solver.particles().to_vec(), solver.parameter_values()), before);
+        assert_eq!((solver.particles().to_vec(), solver.parameter_values().clone()), before);
         // A scene may ask for it, and only its own states have it.
         let mut overfull = self::solver(&text("thickness = 0.2"));
         let (particles, keyframe) = (overfull.particles().to_vec(), overfull.keyframe());
@@ -206,7 +207,7 @@ fn a_contact_distance_with_too_many_neighbours_at_load_is_refused_and_changes_no
         if mode != "off" {
             assert!(matches!(restored, Err(RestoreError::Mismatch { .. })), "{restored:?}");
         }
-        solver.set("contact", ParameterValue::Number(0.1), None).unwrap();
+        solver.set("contact.thickness", ParameterValue::Number(0.1), None).unwrap();
         step(&mut solver, 20);
         assert_eq!(solver.particles(), before.0, "{mode}: neighbours repel each other");
     }
@@ -225,7 +226,7 @@ fn a_refused_contact_distance_leaves_the_contacts_as_they_are() {
     let mut refusing = pile.clone();
     let count = refusing.contact_overflow_count();
     assert!(count > 0, "all pairs fit");
-    let set = refusing.set("contact", ParameterValue::Number(0.2), None);
+    let set = refusing.set("contact.thickness", ParameterValue::Number(0.2), None);
     assert_eq!(set, Err(Reason::OutOfRange));
     for _ in 0..3 {
         step(&mut pile, 1);
@@ -234,7 +235,7 @@ fn a_refused_contact_distance_leaves_the_contacts_as_they_are() {
         assert_eq!(refusing.contact_overflow_count(), pile.contact_overflow_count());
     }
     // Another distance does not forget that contacts were ignored.
-    refusing.set("contact", ParameterValue::Off, None).unwrap();
+    refusing.set("contact.thickness", ParameterValue::Off, None).unwrap();
     step(&mut refusing, 1);
     assert!(refusing.contact_overflow_count() > count);
 }
@@ -282,20 +283,20 @@ fn contacts_can_be_switched_off_and_on_while_the_scene_runs() {
     heap.reset();
     step(&mut heap, 1);
     assert_eq!(heap.state_hash(), started);
-    set(&mut heap, "contact", ParameterValue::Off);
+    set(&mut heap, "contact.thickness", ParameterValue::Off);
     step(&mut heap, 100);
     assert_ne!(heap.state_hash(), touching);
     let passing = stepped(&(rates(240, 4) + &self::heap(16)), 100);
     assert_eq!(heap.state_hash(), passing.state_hash());
     heap.reset();
     step(&mut heap, 1);
-    let thickness = heap.parameter_values().contact.unwrap();
-    set(&mut heap, "contact", ParameterValue::Off);
-    set(&mut heap, "contact", ParameterValue::Number(thickness));
+    let thickness = heap.parameter_values().optional(Parameter::ContactThickness).unwrap();
+    set(&mut heap, "contact.thickness", ParameterValue::Off);
+    set(&mut heap, "contact.thickness", ParameterValue::Number(thickness));
     step(&mut heap, 100);
     assert_eq!(heap.state_hash(), touching);
-    set(&mut heap, "contact_friction", ParameterValue::Number(0.0));
-    assert_eq!(heap.parameter_values().contact_friction, 0.0);
+    set(&mut heap, "contact.friction", ParameterValue::Number(0.0));
+    assert_eq!(heap.parameter_values().number(Parameter::ContactFriction), 0.0);
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Particles that touch triangles: the laws of friction, cloths that fold, and torn cloths.
 
-use sim_solver::{ParameterValue, Particle, Scene, Solver, builtin};
+use sim_solver::{Parameter, ParameterValue, Particle, Scene, Solver, builtin};
 
 use super::super::{assert_at_most, assert_near, rates, solver, step, stepped};
 use super::cloths::{
@@ -215,13 +215,13 @@ fn contacts_can_be_switched_off_and_on_while_the_scene_runs() {
         [CONTACT, ""].map(|contact| stepped(&scene(contact), 100).state_hash());
     assert_ne!(touching, passing);
     let mut heap = solver(&scene(CONTACT));
-    let thickness = heap.parameter_values().contact.unwrap();
-    heap.set("contact", ParameterValue::Off, None).unwrap();
+    let thickness = heap.parameter_values().optional(Parameter::ContactThickness).unwrap();
+    heap.set("contact.thickness", ParameterValue::Off, None).unwrap();
     step(&mut heap, 100);
     assert_eq!(heap.state_hash(), passing);
     heap.reset();
-    heap.set("contact", ParameterValue::Off, None).unwrap();
-    heap.set("contact", ParameterValue::Number(thickness), None).unwrap();
+    heap.set("contact.thickness", ParameterValue::Off, None).unwrap();
+    heap.set("contact.thickness", ParameterValue::Number(thickness), None).unwrap();
     // The first of them publishes the initial state.
     step(&mut heap, 101);
     assert_eq!(heap.state_hash(), touching);
