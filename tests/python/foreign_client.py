@@ -6,6 +6,7 @@ usage: foreign_client.py PREFIX ROOT SERVICES.md
 import ctypes
 import json
 import re
+import struct
 import sys
 
 import iceoryx2 as iox2
@@ -72,9 +73,10 @@ def main(prefix, root, path):
     subscriber = outcomes.subscriber_builder().create()
     publisher = commands.publisher_builder().create()
 
-    def request(kind, client_id, sequence, **fields):
+    def request(kind, client_id, sequence, layout, *values):
         """Sends a command, and waits for its outcome."""
-        command = Command(kind=kinds[kind], client_id=client_id, sequence=sequence, **fields)
+        command = Command(kind=kinds[kind], client_id=client_id, sequence=sequence)
+        struct.pack_into("<" + layout, command.fields, 0, *values)
         publisher.loan_uninit().write_payload(command).send()
         while True:
             sample = subscriber.receive()
@@ -85,16 +87,14 @@ def main(prefix, root, path):
             if (answer.command.client_id, answer.command.sequence) == (client_id, sequence):
                 return [kind, answer.status, reasons[answer.reason]]
 
-    vectors = ((ctypes.c_float * 3) * 3)((0.5, 0.2, 0.3))
-    grab = {"index": 90, "vectors": vectors, "number": 0.1}
     report = [
-        request("grab", 7, 1, **grab),
-        request("pin", 7, 2, index=10**6),
-        request("cut", 7, 3, index=40),
-        request("cut", 7, 4, index=40),
-        request("pin", 2**53 - 1, 1, index=3),
-        request("pin", 2**53, 1, index=4),
-        request("load", 2**64 - 1, 1, text=(ctypes.c_uint8 * 160)(*b"rope")),
+        request("grab", 7, 1, "I3ff", 90, 0.5, 0.2, 0.3, 0.1),
+        request("pin", 7, 2, "I", 10**6),
+        request("cut", 7, 3, "I", 40),
+        request("cut", 7, 4, "I", 40),
+        request("pin", 2**53 - 1, 1, "I", 3),
+        request("pin", 2**53, 1, "I", 4),
+        request("load", 2**64 - 1, 1, "160s", b"rope"),
     ]
     print(json.dumps(report))
     # Destroyed in any other order, the ports leave a dead node behind.

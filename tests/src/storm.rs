@@ -6,8 +6,8 @@ use std::path::Path;
 use fastrand::Rng;
 use recording::{FrameReader, LogReader};
 use sim_contract::{
-    Action, Client, ELEMENTS_MAX, Endpoint, GivenState, MovedObject, Outcome, ParameterValue,
-    ParticleState, PathPart, PathPoint, Reason, RestoreContents, Text, scene_hash,
+    Action, Client, ELEMENTS_MAX, Endpoint, GivenState, MovedObject, Outcome, Part, ParticleState,
+    PathPart, PathPoint, Reason, RestoreContents, scene_hash,
 };
 
 use crate::process::{Process, ctl, record};
@@ -222,13 +222,7 @@ fn bad_action(held: &HeldState, rng: &mut Rng) -> Action {
         2 => Action::Grab { particle: 90, target, over_s },
         3 => Action::CutRadius { center: target, radius: 0.05 },
         4 => set("substeps", 0.5),
-        6 => Action::Set {
-            parameter: Text::cut("bending"),
-            value: ParameterValue::Number(0.1),
-            constraint_kind: None,
-            block: Some(rng.u32(1000..)),
-            collider: None,
-        },
+        6 => Action::set("bending", 0.1).for_part(Part::Block(rng.u32(1000..))),
         5 => Action::Rewind { to_step: Some(u64::MAX >> 12), back_steps: None },
         // A command alone has no state.
         _ => Action::Restore { contents: RestoreContents::State, state_hash: rng.u64(..) },
@@ -236,14 +230,7 @@ fn bad_action(held: &HeldState, rng: &mut Rng) -> Action {
 }
 
 fn set(parameter: &str, value: f32) -> Action {
-    let parameter = Text::new(parameter).expect("a short name");
-    Action::Set {
-        parameter,
-        value: ParameterValue::Number(value),
-        constraint_kind: None,
-        block: None,
-        collider: None,
-    }
+    Action::set(parameter, value)
 }
 
 /// Returns a state with one fault.

@@ -20,6 +20,7 @@
 #define CATENARY_CONTRACT_VERSION 7  // version of the layouts of this header
 #define CATENARY_MEMBERS_MAX 16  // most members of the lockstep
 #define CATENARY_MEMBER_CHANGES_KEPT 32  // changes that a status names
+#define CATENARY_FIELDS_SIZE_BYTES 232  // bytes of the fields of a command
 #define CATENARY_TEXT_SIZE_BYTES_MAX 160  // longest text of a command
 #define CATENARY_PARTICLE_PINNED 1  // held in place
 #define CATENARY_PARTICLE_GRABBED 2  // driven by a client
@@ -34,20 +35,6 @@
 #define CATENARY_OUTCOME_CONTROL 1  // answers a command to a replay
 #define CATENARY_OUTCOME_DISCONNECTED 2  // release of a lost grab
 #define CATENARY_OUTCOME_NEW_RUN 4  // the scene begins a new run at step 0
-#define CATENARY_OPTION_LIMIT 1  // a push has a limit
-#define CATENARY_OPTION_VALUE_NUMBER 2  // a set has a number
-#define CATENARY_OPTION_VALUE_VECTOR 4  // a set has a vector
-#define CATENARY_OPTION_VALUE_OFF 8  // a set switches off
-#define CATENARY_OPTION_CONSTRAINT_KIND 16  // a set is for one kind
-#define CATENARY_OPTION_FORCE 32  // a release is for the grab of any client
-#define CATENARY_OPTION_TO 64  // a rewind has a step of the run
-#define CATENARY_OPTION_BACK 128  // a rewind has a number of steps
-#define CATENARY_OPTION_STATE 256  // a restore has a complete state
-#define CATENARY_OPTION_MOTION 512  // a restore has positions and velocities
-#define CATENARY_OPTION_BLOCK 1024  // a set is for one generated block
-#define CATENARY_OPTION_COLLIDER 2048  // a set is for one collider; a follow moves a collider
-#define CATENARY_OPTION_ANCHOR 4096  // a follow moves an anchor
-#define CATENARY_OPTION_APPEND 8192  // a follow appends its points
 
 
 // Result of a call. `catenary_last_error` describes every other result than `CATENARY_OK`.
@@ -119,74 +106,22 @@ typedef uint32_t catenary_member_change_kind;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
-// Shape of a collider.
-enum catenary_collider_shape
+// Effect of a command.
+enum catenary_outcome_status
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
   : uint32_t
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
-  // A solid half space.
-  CATENARY_COLLIDER_SHAPE_PLANE = 0,
-  // A solid box.
-  CATENARY_COLLIDER_SHAPE_BOX = 1,
-  // A solid sphere.
-  CATENARY_COLLIDER_SHAPE_SPHERE = 2,
-  // All points within a radius of a segment.
-  CATENARY_COLLIDER_SHAPE_CAPSULE = 3,
-  // A box that particles stay inside.
-  CATENARY_COLLIDER_SHAPE_BOUNDS = 4,
-  // Triangles with two sides.
-  CATENARY_COLLIDER_SHAPE_MESH = 5,
+  // It took effect, in the step that the outcome names.
+  CATENARY_OUTCOME_STATUS_APPLIED = 0,
+  // It changed no bit of the state.
+  CATENARY_OUTCOME_STATUS_REJECTED = 1,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
-typedef enum catenary_collider_shape catenary_collider_shape;
+typedef enum catenary_outcome_status catenary_outcome_status;
 #else
-typedef uint32_t catenary_collider_shape;
-#endif // __STDC_VERSION__ >= 202311L
-#endif // __cplusplus
-
-// The role of a constraint in its scene.
-enum catenary_constraint_kind
-#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
-  : uint32_t
-#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
- {
-  // Joins direct neighbours.
-  CATENARY_CONSTRAINT_KIND_STRUCTURAL = 0,
-  // Crosses a cell diagonally.
-  CATENARY_CONSTRAINT_KIND_SHEAR = 1,
-  // Joins second neighbours.
-  CATENARY_CONSTRAINT_KIND_BEND = 2,
-  // Acts only while it is longer than its rest length.
-  CATENARY_CONSTRAINT_KIND_TETHER = 3,
-};
-#ifndef __cplusplus
-#if __STDC_VERSION__ >= 202311L
-typedef enum catenary_constraint_kind catenary_constraint_kind;
-#else
-typedef uint32_t catenary_constraint_kind;
-#endif // __STDC_VERSION__ >= 202311L
-#endif // __cplusplus
-
-// Method of solving constraints. It determines the meaning of a constraint's softness.
-enum catenary_method
-#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
-  : uint32_t
-#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
- {
-  // XPBD, with compliance in m/N: the stretch is the same at every rate (Macklin, Mueller, Chentanez
-  // 2016).
-  CATENARY_METHOD_XPBD = 0,
-  // PBD, with stiffness 0..=1: the share of the error that the iterations of a substep remove
-  // (Mueller et al. 2007).
-  CATENARY_METHOD_PBD = 1,
-};
-#ifndef __cplusplus
-#if __STDC_VERSION__ >= 202311L
-typedef enum catenary_method catenary_method;
-#else
-typedef uint32_t catenary_method;
+typedef uint32_t catenary_outcome_status;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
@@ -232,6 +167,56 @@ typedef uint32_t catenary_reason;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
+// The role of a constraint in its scene.
+enum catenary_constraint_kind
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  // Joins direct neighbours.
+  CATENARY_CONSTRAINT_KIND_STRUCTURAL = 0,
+  // Crosses a cell diagonally.
+  CATENARY_CONSTRAINT_KIND_SHEAR = 1,
+  // Joins second neighbours.
+  CATENARY_CONSTRAINT_KIND_BEND = 2,
+  // Acts only while it is longer than its rest length.
+  CATENARY_CONSTRAINT_KIND_TETHER = 3,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum catenary_constraint_kind catenary_constraint_kind;
+#else
+typedef uint32_t catenary_constraint_kind;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+// Shape of a collider.
+enum catenary_collider_shape
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  // A solid half space.
+  CATENARY_COLLIDER_SHAPE_PLANE = 0,
+  // A solid box.
+  CATENARY_COLLIDER_SHAPE_BOX = 1,
+  // A solid sphere.
+  CATENARY_COLLIDER_SHAPE_SPHERE = 2,
+  // All points within a radius of a segment.
+  CATENARY_COLLIDER_SHAPE_CAPSULE = 3,
+  // A box that particles stay inside.
+  CATENARY_COLLIDER_SHAPE_BOUNDS = 4,
+  // Triangles with two sides.
+  CATENARY_COLLIDER_SHAPE_MESH = 5,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum catenary_collider_shape catenary_collider_shape;
+#else
+typedef uint32_t catenary_collider_shape;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
 // Cause of a tear.
 enum catenary_tear_cause
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -255,22 +240,24 @@ typedef uint32_t catenary_tear_cause;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
-// Effect of a command.
-enum catenary_outcome_status
+// Method of solving constraints. It determines the meaning of a constraint's softness.
+enum catenary_method
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
   : uint32_t
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
-  // It took effect, in the step that the outcome names.
-  CATENARY_OUTCOME_STATUS_APPLIED = 0,
-  // It changed no bit of the state.
-  CATENARY_OUTCOME_STATUS_REJECTED = 1,
+  // XPBD, with compliance in m/N: the stretch is the same at every rate (Macklin, Mueller, Chentanez
+  // 2016).
+  CATENARY_METHOD_XPBD = 0,
+  // PBD, with stiffness 0..=1: the share of the error that the iterations of a substep remove
+  // (Mueller et al. 2007).
+  CATENARY_METHOD_PBD = 1,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
-typedef enum catenary_outcome_status catenary_outcome_status;
+typedef enum catenary_method catenary_method;
 #else
-typedef uint32_t catenary_outcome_status;
+typedef uint32_t catenary_method;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
@@ -309,6 +296,27 @@ typedef uint32_t catenary_parameter;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
+// Object that a command `follow` moves.
+enum catenary_moved_object
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  // A particle that the client has grabbed.
+  CATENARY_MOVED_OBJECT_PARTICLE = 0,
+  // An anchor.
+  CATENARY_MOVED_OBJECT_ANCHOR = 1,
+  // A collider.
+  CATENARY_MOVED_OBJECT_COLLIDER = 2,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum catenary_moved_object catenary_moved_object;
+#else
+typedef uint32_t catenary_moved_object;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
 // A connection to a simulation. It reads snapshots and sends commands.
 //
 // A client may be used by any thread, but by one at a time: a call while another thread is in a call
@@ -318,58 +326,17 @@ typedef struct catenary_client catenary_client;
 
 // A command: 256 bytes, alignment 8. Written by clients, read by the owner of the name; also part
 // of an `catenary_outcome`.
-//
-// Fields that a kind does not use are 0. Lengths are in m, relative to the scene's origin; times
-// are in s.
-//
-// | kind | `index` | `vectors` | other fields |
-// |---|---|---|---|
-// | 1 pin, 2 unpin | particle | | |
-// | 5 release | particle | | `CATENARY_OPTION_FORCE` |
-// | 3 grab, 4 move | particle | target | `number` over_s |
-// | 6 pause, 7 resume, 9 reset | | | |
-// | 8 step | | | `count` steps |
-// | 10 push | | center, delta | `number` radius, `limit` |
-// | 11 cut | constraint | | |
-// | 12 cut_radius | | center | `number` radius |
-// | 13 cut_segment | | from, to, direction | |
-// | 14 move_anchor | anchor | translation | `rotation`, `number` over_s |
-// | 15 move_collider | collider | translation | `rotation`, `number` over_s |
-// | 16 set | block or collider | value, if a vector | `text` parameter, `number` value, `count` constraint kind |
-// | 17 load | | | `text` scene |
-// | 18 rewind | step, low 32 bits | | `count` step, high 32 bits; or `CATENARY_OPTION_BACK` and `count` steps |
-// | 19 restore | hash, low 32 bits | | `count` hash, high 32 bits; `CATENARY_OPTION_STATE` or `CATENARY_OPTION_MOTION` |
-// | 20 mark | | | `text` |
-// | 21 drive_body | collider | translation, velocity, angular velocity | `rotation`, `Command::wrench` |
-// | 22 follow | particle, anchor or collider | | `CATENARY_OPTION_ANCHOR` or `CATENARY_OPTION_COLLIDER`, else a particle; `CATENARY_OPTION_APPEND`; `count` `Command::points` |
 typedef struct {
-  // Number of the action in the table above.
+  // Number of the kind of command.
   uint32_t kind;
-  // Index of the particle, constraint, anchor, collider or, if `CATENARY_OPTION_BLOCK` is set, generated
-  // block. A set has a collider only with `CATENARY_OPTION_COLLIDER`.
-  uint32_t index;
+  // Always 0.
+  uint32_t spare;
   // Random number of the sender, below 2^53 (exact in JSON); `CONSOLE_CLIENT_ID` is the console.
   uint64_t client_id;
   // Number of the command among those of its client, ascending, below 2^53.
   uint64_t sequence;
-  // Points, offsets and directions, in the order of the table.
-  float vectors[3][3];
-  // Quaternion x, y, z, w.
-  float rotation[4];
-  // Time of grab, move, `move_anchor` and `move_collider` in seconds, radius of push and `cut_radius`, value of set.
-  float number;
-  // Limit of push, if `CATENARY_OPTION_LIMIT` is set.
-  float limit;
-  // Number of steps of step; number of points of follow; `catenary_constraint_kind` of set, if
-  // `CATENARY_OPTION_CONSTRAINT_KIND` is set.
-  uint32_t count;
-  // `CommandOptions` bits.
-  uint32_t options;
-  // UTF-8 text, padded with zeros; force and torque of `drive_body`, see `Command::wrench`; points of `follow`, see
-  // `Command::points`.
-  uint8_t text[CATENARY_TEXT_SIZE_BYTES_MAX];
-  // Always 0.
-  uint32_t spare;
+  // Fields of the kind, one after the other, without gaps; then zeros.
+  uint8_t fields[CATENARY_FIELDS_SIZE_BYTES];
 } catenary_command;
 
 // Header of `forces`: 24 bytes, alignment 8. The payload has a row for each collider, then for each anchor,
@@ -961,8 +928,8 @@ catenary_command catenary_command_move_collider(uint32_t collider,
 catenary_command catenary_command_with_over(catenary_command motion,
                                             float over_s);
 
-// Leads an anchor (`object` is `CATENARY_OPTION_ANCHOR`), a collider (`CATENARY_OPTION_COLLIDER`) or a particle that this
-// client has grabbed (0) along the points of `catenary_command_with_point`.
+// Leads an object (`object` is a `catenary_moved_object`) along the points of `catenary_command_with_point`: an anchor, a
+// collider, or a particle that this client has grabbed.
 catenary_command catenary_command_follow(uint32_t object,
                                          uint32_t object_index);
 
@@ -1020,9 +987,13 @@ catenary_command catenary_command_for_collider(catenary_command set,
 // Loads a built-in scene, or a file that the node can read; at most 160 bytes.
 catenary_command catenary_command_load(const char *scene);
 
-// Puts the nearest kept state at or before a step of this run in place. The outcome has its step
-// (`index` is the low half, `count` the high half of a 64-bit number).
+// Puts the nearest kept state at or before a step of this run in place; `catenary_command_rewound_step` of the outcome's command
+// returns its step.
 catenary_command catenary_command_rewind_to(uint64_t step);
+
+// Returns the step of the state that a rewind has put in place, from the command of its outcome; `UINT64_MAX` for another
+// command.
+uint64_t catenary_command_rewound_step(catenary_command rewind);
 
 // Puts the nearest kept state at least a number of steps ago in place.
 catenary_command catenary_command_rewind_back(uint32_t steps);

@@ -3,8 +3,7 @@
 use std::ffi::c_char;
 
 use sim_contract::{
-    Action, Command, CommandOptions, KindFilter, MovedObject, ParameterValue, PathPart, PathPoint,
-    Text,
+    Action, Command, KindFilter, MovedObject, ParameterValue, Part, PathPart, PathPoint, Text,
 };
 
 use crate::pointers::{numbers, text};
@@ -175,18 +174,17 @@ pub extern "C" fn catenary_command_with_over(motion: Command, over_s: f32) -> Co
     command(Some(action))
 }
 
-/// Leads an anchor (`object` is `CATENARY_OPTION_ANCHOR`), a collider (`CATENARY_OPTION_COLLIDER`) or a particle that this
-/// client has grabbed (0) along the points of `catenary_command_with_point`.
+/// Leads an object (`object` is a `catenary_moved_object`) along the points of `catenary_command_with_point`: an anchor, a
+/// collider, or a particle that this client has grabbed.
 #[unsafe(no_mangle)]
 pub extern "C" fn catenary_command_follow(object: u32, object_index: u32) -> Command {
-    let object = match object {
-        0 => Some(MovedObject::Particle),
-        CommandOptions::ANCHOR => Some(MovedObject::Anchor),
-        CommandOptions::COLLIDER => Some(MovedObject::Collider),
-        _ => None,
-    };
     let (path, append) = (PathPart::EMPTY, false);
-    command(object.map(|object| Action::Follow { object, object_index, path, append }))
+    command(MovedObject::from_number(object).map(|object| Action::Follow {
+        object,
+        object_index,
+        path,
+        append,
+    }))
 }
 
 /// Adds a point to a `catenary_command_follow`, which has at most 4: the time in seconds after the step of the command that
@@ -302,19 +300,10 @@ pub extern "C" fn catenary_command_set_off(parameter: *const c_char) -> Command 
 /// `catenary_constraint_kind`). Any other command is returned unchanged.
 #[unsafe(no_mangle)]
 pub extern "C" fn catenary_command_for_kind(set: Command, constraint_kind: u32) -> Command {
-    match set.action() {
-        Action::Set { parameter, value, .. } => {
-            let constraint_kind = Some(KindFilter::from_number(constraint_kind));
-            command(Some(Action::Set {
-                parameter,
-                value,
-                constraint_kind,
-                block: None,
-                collider: None,
-            }))
-        }
-        _ => set,
-    }
+    let Action::Set { parameter, value, .. } = set.action() else { return set };
+    let constraint_kind = Some(KindFilter::from_number(constraint_kind));
+    let (block, collider) = (None, None);
+    command(Some(Action::Set { parameter, value, constraint_kind, block, collider }))
 }
 
 /// Returns a command that sets "bending", for the bends of one generated block only: the index of the
@@ -322,44 +311,26 @@ pub extern "C" fn catenary_command_for_kind(set: Command, constraint_kind: u32) 
 /// returned unchanged.
 #[unsafe(no_mangle)]
 pub extern "C" fn catenary_command_for_block(set: Command, block: u32) -> Command {
-    match set.action() {
-        Action::Set { parameter, value, .. } => command(Some(Action::Set {
-            parameter,
-            value,
-            constraint_kind: None,
-            block: Some(block),
-            collider: None,
-        })),
-        _ => set,
-    }
+    for_part(set, Part::Block(block))
 }
 
 /// Returns a command that sets "friction" or "restitution", for one collider only: its index in the scene. A node
 /// rejects a collider for another parameter. Any command other than a set is returned unchanged.
 #[unsafe(no_mangle)]
 pub extern "C" fn catenary_command_for_collider(set: Command, collider: u32) -> Command {
+    for_part(set, Part::Collider(collider))
+}
+
+fn for_part(set: Command, part: Part) -> Command {
     match set.action() {
-        Action::Set { parameter, value, .. } => command(Some(Action::Set {
-            parameter,
-            value,
-            constraint_kind: None,
-            block: None,
-            collider: Some(collider),
-        })),
+        action @ Action::Set { .. } => command(Some(action.for_part(part))),
         _ => set,
     }
 }
 
 fn set(parameter: *const c_char, value: Option<ParameterValue>) -> Command {
     let pair = short_text(parameter).zip(value);
-    let (constraint_kind, block, collider) = (None, None, None);
-    command(pair.map(|(parameter, value)| Action::Set {
-        parameter,
-        value,
-        constraint_kind,
-        block,
-        collider,
-    }))
+    command(pair.map(|(parameter, value)| Action::set(parameter.as_str(), value)))
 }
 
 /// Loads a built-in scene, or a file that the node can read; at most 160 bytes.
@@ -368,11 +339,21 @@ pub extern "C" fn catenary_command_load(scene: *const c_char) -> Command {
     command(short_text(scene).map(|scene| Action::Load { scene }))
 }
 
-/// Puts the nearest kept state at or before a step of this run in place. The outcome has its step
-/// (`index` is the low half, `count` the high half of a 64-bit number).
+/// Puts the nearest kept state at or before a step of this run in place; `catenary_command_rewound_step` of the outcome's command
+/// returns its step.
 #[unsafe(no_mangle)]
 pub extern "C" fn catenary_command_rewind_to(step: u64) -> Command {
     command(Some(Action::Rewind { to_step: Some(step), back_steps: None }))
+}
+
+/// Returns the step of the state that a rewind has put in place, from the command of its outcome; `UINT64_MAX` for another
+/// command.
+#[unsafe(no_mangle)]
+pub extern "C" fn catenary_command_rewound_step(rewind: Command) -> u64 {
+    match rewind.action() {
+        Action::Rewind { to_step: Some(step), .. } => step,
+        _ => u64::MAX,
+    }
 }
 
 /// Puts the nearest kept state at least a number of steps ago in place.

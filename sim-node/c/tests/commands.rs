@@ -5,8 +5,7 @@ use std::ptr::null;
 
 use catenary::*;
 use sim_contract::{
-    Action, Command, CommandOptions, KindFilter, MovedObject, ParameterValue, PathPart, PathPoint,
-    Text,
+    Action, Command, KindFilter, MovedObject, ParameterValue, Part, PathPart, PathPoint, Text,
 };
 
 const A: [f32; 3] = [1.0, -2.0, 3.0];
@@ -20,13 +19,7 @@ fn short(text: &str) -> Text {
 }
 
 fn set(parameter: &str, value: ParameterValue) -> Action {
-    Action::Set {
-        parameter: short(parameter),
-        value,
-        constraint_kind: None,
-        block: None,
-        collider: None,
-    }
+    Action::set(parameter, value)
 }
 
 const ZERO: [f32; 3] = [0.0; 3];
@@ -55,7 +48,7 @@ fn each_function_makes_the_command_of_its_name() {
         path: PathPart::new(&[point(0.5, UNTURNED), point(1.0, QUARTER)]).unwrap(),
         append: true,
     };
-    let empty = catenary_command_follow(CommandOptions::COLLIDER, 2);
+    let empty = catenary_command_follow(MovedObject::Collider as u32, 2);
     let straight = catenary_command_with_point(empty, 0.5, a, null());
     let turned = catenary_command_with_point(straight, 1.0, a, QUARTER.as_ptr());
     let full = (0..4).fold(empty, |command, time| {
@@ -64,20 +57,8 @@ fn each_function_makes_the_command_of_its_name() {
     assert_eq!(catenary_command_with_point(full, 4.0, a, null()), Command::default());
     assert_eq!(catenary_command_follow(3, 2), Command::default());
     let friction = catenary_command_set(c"friction".as_ptr(), 0.5);
-    let for_collider = Action::Set {
-        parameter: short("friction"),
-        value: ParameterValue::Number(0.5),
-        constraint_kind: None,
-        block: None,
-        collider: Some(2),
-    };
-    let for_block = Action::Set {
-        parameter: short("bending"),
-        value: ParameterValue::Number(0.5),
-        constraint_kind: None,
-        block: Some(3),
-        collider: None,
-    };
+    let for_collider = Action::set("friction", 0.5).for_part(Part::Collider(2));
+    let for_block = Action::set("bending", 0.5).for_part(Part::Block(3));
     let cases = [
         (catenary_command_pin(7), Action::Pin { particle: 7 }),
         (catenary_command_unpin(7), Action::Unpin { particle: 7 }),

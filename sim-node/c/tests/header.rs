@@ -10,15 +10,15 @@ use cbindgen::{
     Builder, Config, DocumentationStyle, EnumConfig, ItemType, Language, RenameRule, Style,
 };
 use sim_contract::{
-    BendState, CONTRACT_VERSION, ColliderState, CollidersHeader, CommandOptions, ConstraintState,
-    ForceRow, ForcesHeader, LoadHeader, MEMBER_CHANGES_KEPT, MEMBERS_MAX, NodeStatus,
-    OUTCOME_FLAG_CONTROL, OUTCOME_FLAG_DISCONNECTED, OUTCOME_FLAG_NEW_RUN, Outcome, ParameterState,
-    ParametersHeader, ParticleFlags, ParticleState, SnapshotFlags, SnapshotHeader, StatusFlags,
-    TearsHeader, Text, TornConstraint, Triangle,
+    Action, BendState, CONTRACT_VERSION, ColliderState, CollidersHeader, ConstraintState, ForceRow,
+    ForcesHeader, LoadHeader, MEMBER_CHANGES_KEPT, MEMBERS_MAX, NodeStatus, OUTCOME_FLAG_CONTROL,
+    OUTCOME_FLAG_DISCONNECTED, OUTCOME_FLAG_NEW_RUN, Outcome, ParameterState, ParametersHeader,
+    ParticleFlags, ParticleState, SnapshotFlags, SnapshotHeader, StatusFlags, TearsHeader, Text,
+    TornConstraint, Triangle,
 };
 
 /// Types with their names in the header. The last ones are in no signature: numbers in messages.
-const TYPES: [(&str, &str); 40] = [
+const TYPES: [(&str, &str); 41] = [
     ("CatenaryResult", "catenary_result"),
     ("ClientHandle", "catenary_client"),
     ("Snapshot", "catenary_snapshot"),
@@ -58,16 +58,18 @@ const TYPES: [(&str, &str); 40] = [
     ("ForceKind", "catenary_force_kind"),
     ("Method", "catenary_method"),
     ("Parameter", "catenary_parameter"),
+    ("MovedObject", "catenary_moved_object"),
     ("MemberChangeKind", "catenary_member_change_kind"),
 ];
 
 /// Constants with their names in the header, their values, and their meanings.
 #[rustfmt::skip]
 #[allow(clippy::cast_possible_truncation, reason = "small limits")]
-const CONSTANTS: [(&str, &str, u32, &str); 31] = [
+const CONSTANTS: [(&str, &str, u32, &str); 18] = [
     ("CONTRACT_VERSION", "CATENARY_CONTRACT_VERSION", CONTRACT_VERSION, "version of the layouts of this header"),
     ("MEMBERS_MAX", "CATENARY_MEMBERS_MAX", MEMBERS_MAX as u32, "most members of the lockstep"),
     ("MEMBER_CHANGES_KEPT", "CATENARY_MEMBER_CHANGES_KEPT", MEMBER_CHANGES_KEPT as u32, "changes that a status names"),
+    ("FIELDS_SIZE_BYTES", "CATENARY_FIELDS_SIZE_BYTES", Action::FIELDS_SIZE_BYTES as u32, "bytes of the fields of a command"),
     ("SIZE_BYTES_MAX", "CATENARY_TEXT_SIZE_BYTES_MAX", Text::SIZE_BYTES_MAX as u32, "longest text of a command"),
     ("ParticleFlags::PINNED", "CATENARY_PARTICLE_PINNED", ParticleFlags::PINNED, "held in place"),
     ("ParticleFlags::GRABBED", "CATENARY_PARTICLE_GRABBED", ParticleFlags::GRABBED, "driven by a client"),
@@ -82,20 +84,6 @@ const CONSTANTS: [(&str, &str, u32, &str); 31] = [
     ("OUTCOME_FLAG_CONTROL", "CATENARY_OUTCOME_CONTROL", OUTCOME_FLAG_CONTROL, "answers a command to a replay"),
     ("OUTCOME_FLAG_DISCONNECTED", "CATENARY_OUTCOME_DISCONNECTED", OUTCOME_FLAG_DISCONNECTED, "release of a lost grab"),
     ("OUTCOME_FLAG_NEW_RUN", "CATENARY_OUTCOME_NEW_RUN", OUTCOME_FLAG_NEW_RUN, "the scene begins a new run at step 0"),
-    ("CommandOptions::LIMIT", "CATENARY_OPTION_LIMIT", CommandOptions::LIMIT, "a push has a limit"),
-    ("CommandOptions::VALUE_NUMBER", "CATENARY_OPTION_VALUE_NUMBER", CommandOptions::VALUE_NUMBER, "a set has a number"),
-    ("CommandOptions::VALUE_VECTOR", "CATENARY_OPTION_VALUE_VECTOR", CommandOptions::VALUE_VECTOR, "a set has a vector"),
-    ("CommandOptions::VALUE_OFF", "CATENARY_OPTION_VALUE_OFF", CommandOptions::VALUE_OFF, "a set switches off"),
-    ("CommandOptions::CONSTRAINT_KIND", "CATENARY_OPTION_CONSTRAINT_KIND", CommandOptions::CONSTRAINT_KIND, "a set is for one kind"),
-    ("CommandOptions::FORCE", "CATENARY_OPTION_FORCE", CommandOptions::FORCE, "a release is for the grab of any client"),
-    ("CommandOptions::TO", "CATENARY_OPTION_TO", CommandOptions::TO, "a rewind has a step of the run"),
-    ("CommandOptions::BACK", "CATENARY_OPTION_BACK", CommandOptions::BACK, "a rewind has a number of steps"),
-    ("CommandOptions::STATE", "CATENARY_OPTION_STATE", CommandOptions::STATE, "a restore has a complete state"),
-    ("CommandOptions::MOTION", "CATENARY_OPTION_MOTION", CommandOptions::MOTION, "a restore has positions and velocities"),
-    ("CommandOptions::BLOCK", "CATENARY_OPTION_BLOCK", CommandOptions::BLOCK, "a set is for one generated block"),
-    ("CommandOptions::COLLIDER", "CATENARY_OPTION_COLLIDER", CommandOptions::COLLIDER, "a set is for one collider; a follow moves a collider"),
-    ("CommandOptions::ANCHOR", "CATENARY_OPTION_ANCHOR", CommandOptions::ANCHOR, "a follow moves an anchor"),
-    ("CommandOptions::APPEND", "CATENARY_OPTION_APPEND", CommandOptions::APPEND, "a follow appends its points"),
 ];
 
 const INTRODUCTION: &str = "\
@@ -139,7 +127,7 @@ fn generate() -> String {
     config.parse.include = Some(vec!["sim-contract".to_owned(), "sim-types".to_owned()]);
     config.export.include = TYPES.iter().map(|(rust, _)| (*rust).to_owned()).collect();
     // Their constants make them opaque types.
-    config.export.exclude = ["NumberRange", "ParticleFlags"].map(str::to_owned).to_vec();
+    config.export.exclude = ["Action", "NumberRange", "ParticleFlags"].map(str::to_owned).to_vec();
     config.export.item_types =
         vec![ItemType::Enums, ItemType::Structs, ItemType::OpaqueItems, ItemType::Functions];
     config.export.rename = names().map(|(rust, c)| (rust.to_owned(), c.to_owned())).collect();

@@ -81,7 +81,7 @@ pub use files::place::is_being_written;
 pub use files::text_file::{TextFileError, read_scene_file, to_text};
 pub use limits::*;
 pub use messages::collider::{ColliderState, CollidersHeader};
-pub use messages::command::{CONSOLE_CLIENT_ID, Command, CommandOptions};
+pub use messages::command::{CONSOLE_CLIENT_ID, Command};
 pub use messages::forces::{ForceKind, ForceRow, ForcesHeader};
 pub use messages::member_changes::{MemberChange, MemberChangeKind, MemberChanges};
 pub use messages::outcome::{
@@ -114,11 +114,11 @@ pub use process::file_size::report_file_size_limit;
 pub use process::stop::Stop;
 pub use scratch_domain::ScratchDomain;
 pub use sim_types::{
-    Action, ActionFields, Affects, BlockValue, CLIENT_ID_END, COLLIDERS_MAX, COORDINATE_MAX,
-    ColliderFields, ColliderShape, ConstraintKind, ELEMENTS_MAX, GRAB_OVER_S_DEFAULT, KindFilter,
-    MOTION_POINTS_MAX, Method, MovedObject, NumberRange, OVER_S_MAX, OffMeaning, PARAMETERS,
-    Parameter, ParameterInfo, ParameterValue, ParameterValues, Part, ParticleFlags, Parts,
-    PathError, PathPart, PathPoint, PlainF32, PointFault, Reason, RestoreContents,
-    SCENE_SIZE_BYTES_MAX, SETTINGS_COUNT, STEP_WORK_MAX, Setting, Slider, TearCause, Text,
-    TextError, ValueForm, allowed_indices, json_hash, printable, printable_line,
+    ACTIONS, Action, ActionInfo, Affects, BlockValue, CLIENT_ID_END, COLLIDERS_MAX, COORDINATE_MAX,
+    ColliderFields, ColliderShape, ConstraintKind, ELEMENTS_MAX, FieldForm, FieldInfo,
+    GRAB_OVER_S_DEFAULT, KindFilter, MOTION_POINTS_MAX, Method, MovedObject, NumberRange,
+    OVER_S_MAX, OffMeaning, PARAMETERS, Parameter, ParameterInfo, ParameterValue, ParameterValues,
+    Part, ParticleFlags, Parts, PathError, PathPart, PathPoint, PlainF32, PointFault, Reason,
+    RestoreContents, SCENE_SIZE_BYTES_MAX, SETTINGS_COUNT, STEP_WORK_MAX, Setting, Slider,
+    TearCause, Text, TextError, ValueForm, allowed_indices, json_hash, printable, printable_line,
 };

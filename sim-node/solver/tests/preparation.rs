@@ -20,13 +20,7 @@ fn solver(text: &str) -> Solver {
 
 fn set(parameter: Parameter, value: f32) -> Action {
     let value = ParameterValue::Number(value);
-    Action::Set {
-        parameter: Text::cut(parameter.name()),
-        value,
-        constraint_kind: None,
-        block: None,
-        collider: None,
-    }
+    Action::set(parameter.name(), value)
 }
 
 /// A state to return to.
@@ -167,13 +161,7 @@ const TOUCHING: &str = "version = 1\n[contact]\nmode = \"surfaces\"\nthickness =
 fn prepared_contacts_change_no_bit() {
     let mut plain = solver(TOUCHING);
     let mut assisted = Assisted { solver: plain.clone(), spare: None, plan_count: 0 };
-    let off = Action::Set {
-        parameter: Text::cut(Parameter::ContactThickness.name()),
-        value: ParameterValue::Off,
-        constraint_kind: None,
-        block: None,
-        collider: None,
-    };
+    let off = Action::set(Parameter::ContactThickness.name(), ParameterValue::Off);
     let actions = [
         set(Parameter::ContactThickness, 0.03),
         set(Parameter::ContactThickness, 0.01),
@@ -347,13 +335,7 @@ fn the_commands_of_a_boundary_have_the_same_effect_together_and_one_by_one() {
 #[test]
 fn nothing_is_planned_for_commands_that_are_cheap_or_wrong() {
     let solver = solver(SCENE);
-    let action = |name: &str, value: f32| Action::Set {
-        parameter: Text::cut(name),
-        value: ParameterValue::Number(value),
-        constraint_kind: None,
-        block: None,
-        collider: None,
-    };
+    let action = |name: &str, value: f32| Action::set(name, value);
     assert!(solver.plan([action("compliance", 1e-3)]).is_some());
     // The tethers of another pin.
     assert!(solver.plan([Action::Pin { particle: 1 }]).is_some());

@@ -10,9 +10,7 @@ use std::time::Duration;
 use anyhow::Context;
 use serde::{Deserialize, Serialize};
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
-use sim_contract::{
-    Action, Client, ParameterValue, RequestError, Snapshot, Text, console, report_bus_errors,
-};
+use sim_contract::{Action, Client, RequestError, Snapshot, console, report_bus_errors};
 
 use super::times::{SampleList, Samples};
 use crate::args::{BenchClientArgs, ClientRole};
@@ -102,13 +100,7 @@ impl Measurement {
     /// Sends commands. A sample is the time from the start of a request to its outcome.
     fn command(&mut self, client: &mut Client) -> anyhow::Result<u64> {
         // It is applied, and changes nothing.
-        let action = Action::Set {
-            parameter: Text::cut("time_scale"),
-            value: ParameterValue::Number(1.0),
-            constraint_kind: None,
-            block: None,
-            collider: None,
-        };
+        let action = Action::set("time_scale", 1.0);
         print(READY)?;
         while !self.has_ended() {
             let start_ns = monotonic_ns();

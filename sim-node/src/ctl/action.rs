@@ -167,7 +167,7 @@ fn setting(args: &SetArgs) -> anyhow::Result<Action> {
 
 #[cfg(test)]
 mod tests {
-    use sim_contract::{ConstraintKind, MovedObject, ParameterValue};
+    use sim_contract::{ConstraintKind, MovedObject, ParameterValue, Part};
 
     use super::*;
     use crate::args::{CtlVerb, Verb, try_parse};
@@ -183,14 +183,7 @@ mod tests {
     }
 
     fn set(name: &str, value: ParameterValue, kind: Option<ConstraintKind>) -> Action {
-        let constraint_kind = kind.map(KindFilter::Known);
-        Action::Set {
-            parameter: Text::cut(name),
-            value,
-            constraint_kind,
-            block: None,
-            collider: None,
-        }
+        Action::set(name, value).for_part(kind.map_or(Part::All, Part::Kind))
     }
 
     #[test]
@@ -279,13 +272,7 @@ mod tests {
         let number = ParameterValue::Number(1e-4);
         let expected = set("compliance", number, Some(ConstraintKind::Bend));
         assert_eq!(action("set compliance 1e-4 --kind bend"), expected);
-        let of_collider = Action::Set {
-            parameter: Text::cut("friction"),
-            value: ParameterValue::Number(0.3),
-            constraint_kind: None,
-            block: None,
-            collider: Some(2),
-        };
+        let of_collider = Action::set("friction", 0.3).for_part(Part::Collider(2));
         assert_eq!(action("set friction 0.3 --collider 2"), of_collider);
         let line = ["sim-node", "ctl", "set", "compliance", "1", "--kind", "knot"];
         let error = try_parse(line).unwrap_err().to_string();

@@ -318,14 +318,7 @@ mod tests {
     #[test]
     fn settings_of_a_client_that_follow_each_other_are_removed_together() {
         let set = |sequence| {
-            let (parameter, value) = (Text::cut("damping"), sim_contract::ParameterValue::Off);
-            let action = Action::Set {
-                parameter,
-                value,
-                constraint_kind: None,
-                block: None,
-                collider: None,
-            };
+            let action = Action::set("damping", sim_contract::ParameterValue::Off);
             let command = Command::new(5, sequence, action);
             ReceivedCommand { command, connection: ConnectionId::default() }
         };

@@ -96,8 +96,8 @@ mod tests {
         let mut now = progress(false, 0, false);
         let mut set = |value, constraint_kind| {
             let parameter = Text::new("time_scale").unwrap();
-            let action =
-                Action::Set { parameter, value, constraint_kind, block: None, collider: None };
+            let (block, collider) = (None, None);
+            let action = Action::Set { parameter, value, constraint_kind, block, collider };
             let applied = solver.apply(1, &action)?;
             now.apply(applied).map(|()| now.time_scale)
         };

@@ -1,5 +1,7 @@
 //! The shapes of colliders, and a collider of any shape as plain numbers.
 
+use crate::names::names;
+
 /// Shape of a collider.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u32)]
@@ -18,32 +20,14 @@ pub enum ColliderShape {
     Mesh = 5,
 }
 
-impl ColliderShape {
-    /// All shapes, by number.
-    pub const ALL: [Self; 6] =
-        [Self::Plane, Self::Box, Self::Sphere, Self::Capsule, Self::Bounds, Self::Mesh];
-
-    /// Returns the shape with this number.
-    pub fn from_number(number: u32) -> Option<Self> {
-        Self::ALL.get(number as usize).copied()
-    }
-
-    /// Returns the shape with this name.
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|shape| shape.name() == name)
-    }
-
-    /// Name in scenes and logs.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Plane => "plane",
-            Self::Box => "box",
-            Self::Sphere => "sphere",
-            Self::Capsule => "capsule",
-            Self::Bounds => "bounds",
-            Self::Mesh => "mesh",
-        }
-    }
+names! {
+    ColliderShape:
+    Plane = "plane",
+    Box = "box",
+    Sphere = "sphere",
+    Capsule = "capsule",
+    Bounds = "bounds",
+    Mesh = "mesh",
 }
 
 /// Shape, size and pose of a collider, with the fields of all shapes. Those that the shape does not use are 0.

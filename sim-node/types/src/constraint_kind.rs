@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::names::names;
+
 /// The role of a constraint in its scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -18,27 +20,4 @@ pub enum ConstraintKind {
     Tether = 3,
 }
 
-impl ConstraintKind {
-    /// All kinds, by number.
-    pub const ALL: [Self; 4] = [Self::Structural, Self::Shear, Self::Bend, Self::Tether];
-
-    /// Returns the kind with this number.
-    pub fn from_number(number: u32) -> Option<Self> {
-        Self::ALL.get(number as usize).copied()
-    }
-
-    /// Returns the kind with this name.
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|kind| kind.name() == name)
-    }
-
-    /// Name in scenes, commands and logs.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Structural => "structural",
-            Self::Shear => "shear",
-            Self::Bend => "bend",
-            Self::Tether => "tether",
-        }
-    }
-}
+names!(ConstraintKind: Structural = "structural", Shear = "shear", Bend = "bend", Tether = "tether");

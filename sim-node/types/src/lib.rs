@@ -22,6 +22,7 @@ mod constraint_kind;
 mod json;
 mod limits;
 mod method;
+mod names;
 mod parameter;
 mod parameter_values;
 mod particle_flags;
@@ -33,7 +34,8 @@ mod tear_cause;
 mod text;
 
 pub use action::{
-    Action, ActionFields, GRAB_OVER_S_DEFAULT, KindFilter, MovedObject, RestoreContents,
+    ACTIONS, Action, ActionInfo, FieldForm, FieldInfo, GRAB_OVER_S_DEFAULT, KindFilter,
+    MovedObject, RestoreContents,
 };
 pub use collider_shape::{ColliderFields, ColliderShape};
 pub use constraint_kind::ConstraintKind;

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::names::names;
+
 /// Method of solving constraints. It determines the meaning of a constraint's softness.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -16,25 +18,4 @@ pub enum Method {
     Pbd = 1,
 }
 
-impl Method {
-    /// Both methods, by number.
-    pub const ALL: [Self; 2] = [Self::Xpbd, Self::Pbd];
-
-    /// Returns the method with this number.
-    pub fn from_number(number: u32) -> Option<Self> {
-        Self::ALL.get(number as usize).copied()
-    }
-
-    /// Returns the method with this name.
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|method| method.name() == name)
-    }
-
-    /// Name in scenes and logs.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Xpbd => "xpbd",
-            Self::Pbd => "pbd",
-        }
-    }
-}
+names!(Method: Xpbd = "xpbd", Pbd = "pbd");

@@ -3,6 +3,8 @@
 use std::error::Error;
 use std::fmt;
 
+use crate::names::names;
+
 /// Reason why a command was rejected. A rejected command changes no bit of the state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u32)]
@@ -36,52 +38,21 @@ pub enum Reason {
     InvalidState = 13,
 }
 
-impl Reason {
-    /// All reasons, by ascending number.
-    pub const ALL: [Self; 13] = [
-        Self::NonFinite,
-        Self::OutOfRange,
-        Self::UnknownParticle,
-        Self::UnknownConstraint,
-        Self::UnknownAnchor,
-        Self::UnknownCollider,
-        Self::UnknownParameter,
-        Self::AlreadyTorn,
-        Self::NotGrabbed,
-        Self::GrabbedByOther,
-        Self::NoEffectHere,
-        Self::UnknownStep,
-        Self::InvalidState,
-    ];
-
-    /// Returns the reason with this number.
-    pub fn from_number(number: u32) -> Option<Self> {
-        Self::ALL.into_iter().find(|reason| *reason as u32 == number)
-    }
-
-    /// Returns the reason with this name.
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|reason| reason.name() == name)
-    }
-
-    /// Name in outcomes and logs.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::NonFinite => "non_finite",
-            Self::OutOfRange => "out_of_range",
-            Self::UnknownParticle => "unknown_particle",
-            Self::UnknownConstraint => "unknown_constraint",
-            Self::UnknownAnchor => "unknown_anchor",
-            Self::UnknownCollider => "unknown_collider",
-            Self::UnknownParameter => "unknown_parameter",
-            Self::AlreadyTorn => "already_torn",
-            Self::NotGrabbed => "not_grabbed",
-            Self::GrabbedByOther => "grabbed_by_other",
-            Self::NoEffectHere => "no_effect_here",
-            Self::UnknownStep => "unknown_step",
-            Self::InvalidState => "invalid_state",
-        }
-    }
+names! {
+    Reason:
+    NonFinite = "non_finite",
+    OutOfRange = "out_of_range",
+    UnknownParticle = "unknown_particle",
+    UnknownConstraint = "unknown_constraint",
+    UnknownAnchor = "unknown_anchor",
+    UnknownCollider = "unknown_collider",
+    UnknownParameter = "unknown_parameter",
+    AlreadyTorn = "already_torn",
+    NotGrabbed = "not_grabbed",
+    GrabbedByOther = "grabbed_by_other",
+    NoEffectHere = "no_effect_here",
+    UnknownStep = "unknown_step",
+    InvalidState = "invalid_state",
 }
 
 impl fmt::Display for Reason {

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::names::names;
+
 /// Cause of a tear.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[repr(u32)]
@@ -16,27 +18,4 @@ pub enum TearCause {
     Cut = 3,
 }
 
-impl TearCause {
-    /// All causes, by number.
-    pub const ALL: [Self; 4] = [Self::Force, Self::Stretch, Self::Distance, Self::Cut];
-
-    /// Returns the cause with this number; `None` for a number of another version.
-    pub fn from_number(number: u32) -> Option<Self> {
-        Self::ALL.get(number as usize).copied()
-    }
-
-    /// Returns the cause with this name.
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|cause| cause.name() == name)
-    }
-
-    /// Name in logs.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Force => "force",
-            Self::Stretch => "stretch",
-            Self::Distance => "distance",
-            Self::Cut => "cut",
-        }
-    }
-}
+names!(TearCause: Force = "force", Stretch = "stretch", Distance = "distance", Cut = "cut");

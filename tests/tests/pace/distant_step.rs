@@ -2,7 +2,7 @@
 //! tests wait for could come with a step.
 
 use integration_tests::{DEADLINE, Process, Program, Sandbox, ctl};
-use sim_contract::{Action, Client, ParameterValue, Text};
+use sim_contract::{Action, Client};
 
 /// A node at 1 Hz and a thousandth of real time, and the last step that it made.
 fn slow_node(sandbox: &Sandbox) -> (Process, u64) {
@@ -28,13 +28,7 @@ fn a_new_time_scale_moves_the_step_that_the_node_waits_for() {
     let sandbox = Sandbox::new();
     let (_node, _) = slow_node(&sandbox);
     let mut client = Client::attach(&sandbox.endpoint()).unwrap();
-    let action = Action::Set {
-        parameter: Text::new("time_scale").unwrap(),
-        value: ParameterValue::Number(1000.0),
-        constraint_kind: None,
-        block: None,
-        collider: None,
-    };
+    let action = Action::set("time_scale", 1000.0);
     let step = client.request(action, DEADLINE).unwrap().step;
     loop {
         let snapshot = client.next_snapshot(DEADLINE).unwrap().unwrap();

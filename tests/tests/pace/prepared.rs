@@ -2,7 +2,7 @@
 //! recording verifies.
 
 use integration_tests::{DEADLINE, Process, Program, Sandbox, ctl, record, wait_for};
-use sim_contract::{Action, Client, ParameterValue, Text};
+use sim_contract::{Action, Client, ParameterValue};
 
 /// Keys of `[solver]` for a scene whose paths change with the compliance.
 const TETHERS: &str = "tethers = true";
@@ -19,13 +19,7 @@ fn large_scene(sandbox: &Sandbox, columns: u32, keys: &str) -> String {
 
 fn set(parameter: &str, value: f32) -> Action {
     let value = ParameterValue::Number(value);
-    Action::Set {
-        parameter: Text::new(parameter).unwrap(),
-        value,
-        constraint_kind: None,
-        block: None,
-        collider: None,
-    }
+    Action::set(parameter, value)
 }
 
 #[test]

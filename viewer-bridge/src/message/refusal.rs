@@ -266,13 +266,7 @@ mod tests {
         assert_eq!(refused("damping", Some(7), None), "damping has no values for blocks");
         assert_eq!(refused("bending", None, Some(7)), "bending has no values for colliders");
         assert_eq!(refused("restitution", None, Some(0)), "restitution accepts 0 to 1");
-        let set = Action::Set {
-            parameter: Text::cut("contact"),
-            value: ParameterValue::Off,
-            constraint_kind: None,
-            block: None,
-            collider: None,
-        };
+        let set = Action::set("contact", ParameterValue::Off);
         let renamed = Refusal::of_action(Reason::UnknownParameter, &set);
         assert_eq!(renamed.text("set"), "the parameter is now called contact.thickness");
         assert!(Refusal::UnknownScene.text("load").contains("sim-node scenes"));

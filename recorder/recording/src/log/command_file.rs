@@ -3,7 +3,8 @@
 use serde::Deserialize;
 use serde_json::{Map, Value};
 use sim_contract::{
-    Action, ActionFields, MOTION_POINTS_MAX, PathError, PathPart, PathPoint, PlainF32, Text,
+    ACTIONS, Action, ActionInfo, FieldForm, FieldInfo, MOTION_POINTS_MAX, MovedObject, PathError,
+    PathPart, PathPoint, PlainF32, RestoreContents, Text,
 };
 
 /// A command and the step in which it takes effect.
@@ -120,38 +121,32 @@ fn actions(fields: &Map<String, Value>) -> Result<Vec<Action>, FieldError> {
     let Some(name) = fields.get("kind") else {
         return Err(missing("kind", &kind_names()));
     };
-    let row = ActionFields::ALL.iter().find(|row| name.as_str() == Some(row.kind));
+    let row = name.as_str().and_then(ActionInfo::from_name);
     let row = row.ok_or_else(|| {
-        let meant = ActionFields::meant(name.as_str().unwrap_or_default(), []);
+        let meant = ActionInfo::meant(name.as_str().unwrap_or_default(), []);
         invalid("kind", &format!("{name} is unknown{meant}"), &kind_names())
     })?;
-    let own = || row.required.iter().chain(row.optional).copied();
+    let own = || row.fields.iter().map(|field| field.name);
     let is_known = |name: &str| own().chain(COMMON_FIELDS).any(|known| known == name);
     if let Some(unknown) = fields.keys().find(|name| !is_known(name)) {
         let allowed: Vec<_> = own().chain(COMMON_FIELDS).collect();
-        let meant = ActionFields::meant(row.kind, [unknown.as_str()]);
+        let meant = ActionInfo::meant(row.name, [unknown.as_str()]);
         let problem = format!("is not a field of {name}{meant}");
         return Err(invalid(unknown, &problem, &allowed.join(", ")));
     }
-    for name in own() {
-        match fields.get(name) {
-            Some(value) if is_valid(row.kind, name, value) => {}
+    for field in row.fields {
+        match fields.get(field.name) {
+            Some(value) if is_valid(field.form, value) => {}
             Some(value) => {
-                return Err(invalid(
-                    name,
-                    &format!("{value} is invalid"),
-                    allowed_values(row.kind, name),
-                ));
+                return Err(invalid(field.name, &format!("{value} is invalid"), field.allowed));
             }
-            None if row.required.contains(&name) => {
-                return Err(missing(name, allowed_values(row.kind, name)));
-            }
+            None if !field.is_optional => return Err(missing(field.name, field.allowed)),
             None => {}
         }
     }
     // Either of two fields must be present.
-    if row.kind == "rewind" && !own().any(|name| fields.contains_key(name)) {
-        return Err(missing("to_step", allowed_values(row.kind, "to_step")));
+    if row.name == "rewind" && !own().any(|name| fields.contains_key(name)) {
+        return Err(missing("to_step", row.fields[0].allowed));
     }
     let own_fields =
         fields.iter().filter(|(name, _)| *name == "kind" || own().any(|own| own == *name));
@@ -176,7 +171,7 @@ fn actions(fields: &Map<String, Value>) -> Result<Vec<Action>, FieldError> {
                     invalid("path", &format!("has {count} points"), &allowed)
                 }
                 PathError::Point { .. } => {
-                    invalid("path", &error.to_string(), allowed_values("follow", "path"))
+                    invalid("path", &error.to_string(), FieldInfo::PATH.allowed)
                 }
             })
         }
@@ -186,9 +181,8 @@ fn actions(fields: &Map<String, Value>) -> Result<Vec<Action>, FieldError> {
 
 fn path_points(points: Vec<Value>) -> Result<Vec<PathPoint>, FieldError> {
     let point = |value: Value| {
-        PathPoint::deserialize(&value).map_err(|_| {
-            invalid("path", &format!("{value} is invalid"), allowed_values("follow", "path"))
-        })
+        PathPoint::deserialize(&value)
+            .map_err(|_| invalid("path", &format!("{value} is invalid"), FieldInfo::PATH.allowed))
     };
     points.into_iter().map(point).collect()
 }
@@ -204,62 +198,30 @@ fn integer(fields: &Map<String, Value>, name: &str, min: u64) -> Result<Option<u
     }
 }
 
-fn is_valid(kind: &str, name: &str, value: &Value) -> bool {
+fn is_valid(form: FieldForm, value: &Value) -> bool {
     let is_number = |value: &Value| serde_json::from_value::<PlainF32>(value.clone()).is_ok();
     let are_numbers =
         |count| value.as_array().is_some_and(|all| all.len() == count && all.iter().all(is_number));
-    match name {
-        "rotation" => are_numbers(4),
-        "over_s" | "radius" | "limit" => is_number(value),
-        "value" => value.is_null() || is_number(value) || are_numbers(3),
-        "constraint_kind" => value.is_string() || value.is_null(),
-        "force" if kind == "release" => value.is_boolean(),
-        "target" | "center" | "delta" | "from" | "to" | "direction" | "translation"
-        | "velocity" | "angular_velocity" | "force" | "torque" => are_numbers(3),
-        "path" => value.is_array(),
-        "append" => value.is_boolean(),
-        "object" => ["particle", "anchor", "collider"].iter().any(|object| value == object),
-        "to_step" => value.is_u64(),
-        "contents" => value == "state" || value == "motion",
-        "state_hash" => value.as_str().is_some_and(|text| u64::from_str_radix(text, 16).is_ok()),
-        "parameter" | "scene" | "text" => {
-            value.as_str().is_some_and(|text| Text::new(text).is_ok())
-        }
-        _ => value.as_u64().is_some_and(|number| u32::try_from(number).is_ok()),
-    }
-}
-
-fn allowed_values(kind: &str, name: &str) -> &'static str {
-    match name {
-        "target" | "center" | "delta" | "from" | "to" | "translation" => "three numbers in m",
-        "direction" => "three numbers",
-        "rotation" => "four numbers: a quaternion x, y, z, w",
-        "over_s" => "a number of seconds",
-        "radius" | "limit" => "a number in m",
-        "value" => "a number, three numbers, or null for off",
-        "parameter" => "the name of a parameter, at most 160 bytes",
-        "velocity" => "three numbers in m/s",
-        "angular_velocity" => "three numbers in rad/s",
-        "force" if kind == "release" => "true or false",
-        "force" => "three numbers in N",
-        "torque" => "three numbers in N m",
-        "path" => "points such as {\"time\":0.5,\"translation\":[0,0.1,0],\"rotation\":[0,0,0,1]}",
-        "append" => "true or false",
-        "object" => "particle, anchor or collider",
-        "to_step" => "whole numbers from 0",
-        "contents" => "state or motion",
-        "state_hash" => "16 hex digits in a string",
-        "constraint_kind" => "structural, shear, bend, tether or all",
-        "scene" => "the name of a scene, at most 160 bytes",
-        "text" => "a text of at most 160 bytes",
-        _ => "whole numbers 0..=4294967295",
+    let is_text = |is_valid: fn(&str) -> bool| value.as_str().is_some_and(is_valid);
+    match form {
+        FieldForm::Whole => value.as_u64().is_some_and(|number| u32::try_from(number).is_ok()),
+        FieldForm::Long => value.is_u64(),
+        FieldForm::Number => is_number(value),
+        FieldForm::Flag => value.is_boolean(),
+        FieldForm::Vector => are_numbers(3),
+        FieldForm::Rotation => are_numbers(4),
+        FieldForm::Text => is_text(|text| Text::new(text).is_ok()),
+        FieldForm::Value => value.is_null() || is_number(value) || are_numbers(3),
+        FieldForm::Kind => value.is_string() || value.is_null(),
+        FieldForm::Object => is_text(|text| MovedObject::from_name(text).is_some()),
+        FieldForm::Contents => is_text(|text| RestoreContents::from_name(text).is_some()),
+        FieldForm::Hash => is_text(|text| u64::from_str_radix(text, 16).is_ok()),
+        FieldForm::Path => value.is_array(),
     }
 }
 
 fn kind_names() -> String {
-    let names = ActionFields::ALL.iter().map(|fields| fields.kind);
-    // A log has this kind for a command of another version.
-    names.filter(|name| *name != "unknown").collect::<Vec<_>>().join(", ")
+    ACTIONS.iter().map(|info| info.name).collect::<Vec<_>>().join(", ")
 }
 
 fn missing(field: &str, allowed: &str) -> FieldError {

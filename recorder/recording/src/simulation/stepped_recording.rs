@@ -112,8 +112,6 @@ mod tests {
     use std::fs;
     use std::sync::atomic::AtomicBool;
 
-    use sim_contract::ParameterValue;
-    use sim_contract::Text;
     use sim_solver::builtin;
 
     use super::*;
@@ -121,19 +119,8 @@ mod tests {
 
     /// Commands at the boundaries before steps 3 and 11, one of them rejected.
     fn actions() -> [(u64, Action); 4] {
-        let parameter = Text::new("damping").unwrap();
-        let value = ParameterValue::Number(0.25);
         [
-            (
-                3,
-                Action::Set {
-                    parameter,
-                    value,
-                    constraint_kind: None,
-                    block: None,
-                    collider: None,
-                },
-            ),
+            (3, Action::set("damping", 0.25)),
             (3, Action::Pin { particle: 1 << 20 }),
             (11, Action::Cut { constraint: 7 }),
             (11, Action::Reset),

@@ -125,19 +125,13 @@ impl Control {
 
 #[cfg(test)]
 mod tests {
-    use sim_contract::{KindFilter, Text};
+    use sim_contract::{KindFilter, Part};
 
     use super::*;
 
     fn set(parameter: &str, value: f32) -> Action {
         let value = ParameterValue::Number(value);
-        Action::Set {
-            parameter: Text::cut(parameter),
-            value,
-            constraint_kind: None,
-            block: None,
-            collider: None,
-        }
+        Action::set(parameter, value)
     }
 
     #[test]
@@ -197,8 +191,7 @@ mod tests {
         let constraint_kind = Some(KindFilter::Unknown);
         let of_kind =
             Action::Set { parameter, value, constraint_kind, block: None, collider: None };
-        let of_block =
-            Action::Set { parameter, value, constraint_kind: None, block: Some(0), collider: None };
+        let of_block = set("time_scale", 1.0).for_part(Part::Block(0));
         for action in [of_kind, of_block] {
             assert_eq!(Request::from_action(&action), Err(Reason::OutOfRange));
         }

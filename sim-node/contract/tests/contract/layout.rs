@@ -124,23 +124,7 @@ fn write_state_layouts(text: &mut String) {
 }
 
 fn write_command_and_status_layouts(text: &mut String) {
-    layout!(
-        text,
-        Command {
-            kind,
-            index,
-            client_id,
-            sequence,
-            vectors,
-            rotation,
-            number,
-            limit,
-            count,
-            options,
-            text,
-            spare,
-        }
-    );
+    layout!(text, Command { kind, spare, client_id, sequence, fields });
     layout!(text, Outcome { run_id, index, step, status, reason, flags, spare, command });
     layout!(
         text,

@@ -13,10 +13,11 @@ use iceoryx2::service::static_config::StaticConfig;
 use iceoryx2::service::static_config::messaging_pattern::MessagingPattern;
 use sim_contract::testing::TestDomain;
 use sim_contract::{
-    ActionFields, ColliderShape, CommandOptions, ConstraintKind, ForceKind, MEMBER_CHANGES_KEPT,
-    MEMBERS_MAX, MemberChangeKind, Method, OUTCOME_FLAG_CONTROL, OUTCOME_FLAG_DISCONNECTED,
-    OUTCOME_FLAG_NEW_RUN, OffMeaning, OutcomeStatus, PARAMETERS, ParameterInfo, ParticleFlags,
-    Ready, Reason, RestoreContents, SnapshotFlags, StatusFlags, TearCause, Text, Wake,
+    ACTIONS, Action, ColliderShape, ConstraintKind, FieldForm, FieldInfo, ForceKind,
+    MEMBER_CHANGES_KEPT, MEMBERS_MAX, MemberChangeKind, Method, MovedObject, OUTCOME_FLAG_CONTROL,
+    OUTCOME_FLAG_DISCONNECTED, OUTCOME_FLAG_NEW_RUN, OffMeaning, OutcomeStatus, PARAMETERS,
+    ParameterInfo, ParticleFlags, Ready, Reason, RestoreContents, SnapshotFlags, StatusFlags,
+    TearCause, Text, Wake,
 };
 
 use crate::layout::layouts;
@@ -44,7 +45,12 @@ const SOURCES: [&str; 11] = [
 fn the_tables_of_the_services_page_are_those_of_the_types() {
     check_page(
         "SERVICES.md",
-        &[("services", services()), ("layouts", layout_tables()), ("numbers", number_tables())],
+        &[
+            ("services", services()),
+            ("layouts", layout_tables()),
+            ("numbers", number_tables()),
+            ("commands", command_table()),
+        ],
     );
 }
 
@@ -241,12 +247,10 @@ fn number_tables() -> String {
 }
 
 fn command_numbers() -> [Numbers; 8] {
-    let (unknown, kinds) = ActionFields::ALL.split_last().unwrap();
-    assert_eq!(unknown.kind, "unknown");
-    let kinds = (1..).zip(kinds).map(|(number, one)| (number, one.kind)).collect();
+    let kinds = ACTIONS.iter().map(|info| (info.number, info.name)).collect();
     let statuses = [(OutcomeStatus::Applied, "applied"), (OutcomeStatus::Rejected, "rejected")];
     let reasons = Reason::ALL.map(|one| (one as u32, one.name()));
-    let contents = [(RestoreContents::State, "state"), (RestoreContents::Motion, "motion")];
+    let contents = RestoreContents::ALL.map(|one| (one as u32, one.name()));
     let flags = [
         (OUTCOME_FLAG_CONTROL, "control"),
         (OUTCOME_FLAG_DISCONNECTED, "disconnected"),
@@ -255,12 +259,12 @@ fn command_numbers() -> [Numbers; 8] {
     let parameters = (0..).zip(PARAMETERS).map(|(number, info)| (number, info.name)).collect();
     [
         ("`kind` of a command", kinds),
-        ("`options` of a command, bits", OPTIONS.to_vec()),
+        ("an object of `follow`", MovedObject::ALL.map(|one| (one as u32, one.name())).to_vec()),
         ("`status` of an outcome", statuses.map(|(one, name)| (one as u32, name)).to_vec()),
         ("`reason` of an outcome", [(0, "none")].into_iter().chain(reasons).collect()),
         ("`flags` of an outcome, bits", flags.to_vec()),
         ("`parameter`", parameters),
-        ("`contents` of a restore", contents.map(|(one, name)| (one as u32, name)).to_vec()),
+        ("`contents` of a restore", contents.to_vec()),
         ("`tag` of a member's message", vec![(Ready::TAG, "ready"), (Ready::REPEAT_TAG, "repeat")]),
     ]
 }
@@ -305,22 +309,45 @@ fn state_numbers() -> [Numbers; 10] {
     ]
 }
 
-const OPTIONS: [(u32, &str); 14] = [
-    (CommandOptions::LIMIT, "limit"),
-    (CommandOptions::VALUE_NUMBER, "value is a number"),
-    (CommandOptions::VALUE_VECTOR, "value is a vector"),
-    (CommandOptions::VALUE_OFF, "value is off"),
-    (CommandOptions::CONSTRAINT_KIND, "constraint kind"),
-    (CommandOptions::FORCE, "force"),
-    (CommandOptions::TO, "to step"),
-    (CommandOptions::BACK, "back steps"),
-    (CommandOptions::STATE, "state"),
-    (CommandOptions::MOTION, "motion"),
-    (CommandOptions::BLOCK, "block"),
-    (CommandOptions::COLLIDER, "collider"),
-    (CommandOptions::ANCHOR, "anchor"),
-    (CommandOptions::APPEND, "append"),
-];
+/// The fields of each kind of command, with their places.
+fn command_table() -> String {
+    let mut text = "| kind | `fields` |\n|---|---|\n".to_owned();
+    for info in ACTIONS {
+        let mut offset = 0;
+        let fields = info.fields.iter().map(|field| {
+            let at = offset;
+            offset += field.size_bytes;
+            format!("+{at} {} {}", wire_type(field), field.name)
+        });
+        let fields: Vec<_> = fields.collect();
+        assert!(offset <= Action::FIELDS_SIZE_BYTES, "{}", info.name);
+        writeln!(text, "| {} {} | {} |", info.number, info.name, fields.join(", ")).unwrap();
+    }
+    text
+}
+
+fn wire_type(field: &FieldInfo) -> &'static str {
+    match (field.form, field.size_bytes) {
+        (FieldForm::Whole | FieldForm::Kind, 8) => "optional u32",
+        (
+            FieldForm::Whole
+            | FieldForm::Kind
+            | FieldForm::Flag
+            | FieldForm::Object
+            | FieldForm::Contents,
+            _,
+        ) => "u32",
+        (FieldForm::Long, _) => "optional u64",
+        (FieldForm::Hash, _) => "u64",
+        (FieldForm::Number, 8) => "optional f32",
+        (FieldForm::Number, _) => "f32",
+        (FieldForm::Vector, _) => "f32[3]",
+        (FieldForm::Rotation, _) => "f32[4]",
+        (FieldForm::Text, _) => "u8[160]",
+        (FieldForm::Value, _) => "value",
+        (FieldForm::Path, _) => "points",
+    }
+}
 
 #[test]
 fn a_process_has_the_names_of_its_program_and_of_the_node() {

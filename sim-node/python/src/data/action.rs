@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use sim_contract::{
-    ActionFields, ConstraintKind, GRAB_OVER_S_DEFAULT, KindFilter, MovedObject, PathError,
+    ActionInfo, ConstraintKind, GRAB_OVER_S_DEFAULT, KindFilter, MovedObject, PathError,
     PathPoint, Text, read_scene_file,
 };
 use sim_solver::Scene;
@@ -136,16 +136,10 @@ impl Action {
     #[staticmethod]
     #[pyo3(signature = (object, index, path, append=false))]
     fn follow(object: &str, index: u32, path: Vec<Vec<f64>>, append: bool) -> PyResult<Vec<Self>> {
-        let object = match object {
-            "particle" => MovedObject::Particle,
-            "anchor" => MovedObject::Anchor,
-            "collider" => MovedObject::Collider,
-            _ => {
-                let problem =
-                    format!("'{object}' cannot move (allowed: particle, anchor, collider)");
-                return Err(PyValueError::new_err(problem));
-            }
-        };
+        let object = MovedObject::from_name(object).ok_or_else(|| {
+            let allowed = MovedObject::ALL.map(MovedObject::name).join(", ");
+            PyValueError::new_err(format!("'{object}' cannot move (allowed: {allowed})"))
+        })?;
         let point = |(index, row): (usize, &Vec<f64>)| {
             PathPoint::from_row(row).map_err(|fault| PathError::Point { index, fault })
         };
@@ -266,7 +260,7 @@ impl Action {
         }
         let meant = fields.as_object().map_or_else(String::new, |fields| {
             let kind = fields.get("kind").and_then(serde_json::Value::as_str).unwrap_or_default();
-            ActionFields::meant(kind, fields.keys().map(String::as_str))
+            ActionInfo::meant(kind, fields.keys().map(String::as_str))
         });
         let action = serde_json::from_value(fields);
         action

@@ -165,7 +165,7 @@ impl Solver {
 
 #[cfg(test)]
 mod tests {
-    use sim_types::{ParameterValue, Text};
+    use sim_types::ParameterValue;
 
     use super::*;
     use crate::scene::Scene;
@@ -195,13 +195,7 @@ mod tests {
         let text = "version = 1\n[contact]\nmode = \"particles\"\n[[generate]]\nshape = \"cloth\"\n\
             columns = 40\nrows = 40\nspacing = 0.01\n";
         let mut solver = Solver::new(&Scene::from_toml(text, "test").unwrap());
-        let set = |value| Action::Set {
-            parameter: Text::cut("contact.thickness"),
-            value: ParameterValue::Number(value),
-            constraint_kind: None,
-            block: None,
-            collider: None,
-        };
+        let set = |value| Action::set("contact.thickness", value);
         let plan = solver.plan([set(0.02)]).unwrap();
         assert!(!plan.has_new_constraints);
         solver.offer(plan.prepare(None));

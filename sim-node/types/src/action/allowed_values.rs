@@ -1,6 +1,6 @@
 //! The allowed values of parameters and commands, in words for error messages.
 
-use crate::action::Action;
+use crate::action::{Action, ActionInfo};
 use crate::limits::STEP_WORK_MAX;
 use crate::parameter::{OffMeaning, Parameter, ParameterValue, Parts};
 use crate::reason::Reason;
@@ -97,37 +97,7 @@ impl Action {
                 let work = work(info.parameter);
                 return Some(format!("{values}{work}{kind}{block}{collider}"));
             }
-            Self::Grab { .. } | Self::Move { .. } => {
-                "coordinates within 1e7, z 0 in 2-D, over 0 to 3600 s"
-            }
-            Self::Push { .. } => {
-                "coordinates and delta within 1e7, z 0 in 2-D, radius 0 to 1e7, limit 0 or more"
-            }
-            Self::CutRadius { .. } => "coordinates within 1e7, z 0 in 2-D, radius 0 to 1e7",
-            Self::CutSegment { .. } => {
-                "coordinates within 1e7, direction not 0; in 2-D, z of both ends 0"
-            }
-            Self::MoveAnchor { .. } => {
-                "coordinates within 1e7, rotation not 0, over 0 to 3600 s; in 2-D, z 0 and a rotation about z"
-            }
-            Self::MoveCollider { .. } => {
-                "coordinates within 1e7, rotation not 0, over 0 to 3600 s; in 2-D, z 0 and a rotation about z; \
-                 for bounds, no rotation"
-            }
-            Self::DriveBody { .. } => {
-                "coordinates within 1e7, rotation not 0, velocity within 1e7 m/s and angular velocity within 1e4 rad/s, \
-                 also after a step of the force and torque; in 2-D, z 0 and rotations about z"
-            }
-            Self::Follow { .. } => {
-                "points at ascending times from 0 to 3600 s, after those that they are appended to; coordinates \
-                 within 1e7, rotation not 0; in 2-D, z 0 and rotations about z; for bounds, no rotation; at most \
-                 2048 points of all motions of the scene on their way"
-            }
-            Self::Load { .. } => "a scene that the node can read; see its messages",
-            Self::Step { .. } => "1 or more",
-            Self::Mark { .. } => "a text that is not empty",
-            Self::Rewind { .. } => "a step of this run that the node has made",
-            _ => return None,
+            _ => ActionInfo::from_name(self.kind_name())?.allowed?,
         };
         Some(values.to_owned())
     }
@@ -147,20 +117,12 @@ fn work(parameter: Parameter) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{ConstraintKind, KindFilter, ParameterValue, Text};
+    use crate::{ConstraintKind, ParameterValue, Part};
 
     #[test]
     fn a_contact_distance_in_its_range_has_too_many_neighbours() {
         let values = |number| {
-            let (parameter, value) =
-                (Text::cut("contact.thickness"), ParameterValue::Number(number));
-            let action = Action::Set {
-                parameter,
-                value,
-                constraint_kind: None,
-                block: None,
-                collider: None,
-            };
+            let action = Action::set("contact.thickness", ParameterValue::Number(number));
             action.allowed_values(Reason::OutOfRange).unwrap()
         };
         assert!(values(0.2).starts_with("a smaller distance: "));
@@ -169,13 +131,7 @@ mod tests {
 
     #[test]
     fn a_kind_for_a_parameter_without_kinds_is_named() {
-        let action = Action::Set {
-            parameter: Text::cut("damping"),
-            value: ParameterValue::Number(1.0),
-            constraint_kind: Some(KindFilter::Known(ConstraintKind::Bend)),
-            block: None,
-            collider: None,
-        };
+        let action = Action::set("damping", 1.0).for_part(Part::Kind(ConstraintKind::Bend));
         let values = action.allowed_values(Reason::OutOfRange).unwrap();
         assert_eq!(values, "a number >= 0, or off for 0, no kind");
     }
@@ -183,14 +139,7 @@ mod tests {
     #[test]
     fn a_wrong_block_is_named() {
         let values = |name: &str| {
-            let (parameter, value) = (Text::cut(name), ParameterValue::Number(1.0));
-            let action = Action::Set {
-                parameter,
-                value,
-                constraint_kind: None,
-                block: Some(9),
-                collider: None,
-            };
+            let action = Action::set(name, 1.0).for_part(Part::Block(9));
             action.allowed_values(Reason::OutOfRange).unwrap()
         };
         assert_eq!(values("damping"), "a number >= 0, or off for 0, no block");
@@ -200,13 +149,7 @@ mod tests {
 
     #[test]
     fn a_wrong_collider_is_named() {
-        let set = |name: &str| Action::Set {
-            parameter: Text::cut(name),
-            value: ParameterValue::Number(2.0),
-            constraint_kind: None,
-            block: None,
-            collider: Some(9),
-        };
+        let set = |name: &str| Action::set(name, 2.0).for_part(Part::Collider(9));
         let values = |name: &str| set(name).allowed_values(Reason::OutOfRange).unwrap();
         assert_eq!(values("damping"), "a number >= 0, or off for 0, no collider");
         assert_eq!(values("restitution"), "0 to 1, or off for 0, for one collider or all");

@@ -1,6 +1,6 @@
 //! Translates a command of a client into actions of the node.
 
-use sim_contract::{Action, Parameter, ParameterValue, Reason, Text};
+use sim_contract::{Action, Parameter, Reason, Text};
 
 use super::brush::Stroke;
 use super::command_context::CommandContext;
@@ -64,13 +64,7 @@ pub(super) fn actions(
             let parameter = Text::new(&parameter).map_err(|_| Reason::UnknownParameter)?;
             Action::Set { parameter, value, constraint_kind, block, collider }
         }
-        Command::Rate { value } => Action::Set {
-            parameter: Text::cut(Parameter::TimeScale.name()),
-            value: ParameterValue::Number(value),
-            constraint_kind: None,
-            block: None,
-            collider: None,
-        },
+        Command::Rate { value } => Action::set(Parameter::TimeScale.name(), value),
         Command::Seek { .. } | Command::Loop { .. } | Command::Ghost { .. } => {
             return Err(Refusal::OnlyReplay);
         }

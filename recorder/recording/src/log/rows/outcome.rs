@@ -1,10 +1,14 @@
 //! The row of `/outcomes`.
 
-use schemars::JsonSchema;
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
+use serde_json::{Map, json};
 use sim_contract::{
-    Action, Command, OUTCOME_FLAG_DISCONNECTED, OUTCOME_FLAG_NEW_RUN, Outcome, OutcomeStatus,
-    Reason, RestoreContents,
+    ACTIONS, Action, Command, FieldForm, OUTCOME_FLAG_DISCONNECTED, OUTCOME_FLAG_NEW_RUN, Outcome,
+    OutcomeStatus, Reason, RestoreContents,
 };
 
 use super::json::JsonNumber;
@@ -102,79 +106,50 @@ impl From<&OutcomeRow> for Outcome {
     }
 }
 
-/// The schema of a command, because [`Action`] does not depend on schemars.
-#[derive(JsonSchema)]
-#[allow(dead_code, reason = "only its schema is used")]
-struct ActionSchema {
-    kind: String,
-    #[schemars(skip_serializing_if = "Option::is_none")]
-    particle: Option<u32>,
-    #[schemars(skip_serializing_if = "Option::is_none")]
-    force: Option<ForceSchema>,
-    #[schemars(skip_serializing_if = "Option::is_none")]
-    target: Option<[JsonNumber; 3]>,
-    #[schemars(skip_serializing_if = "Option::is_none")]
-    over_s: Option<JsonNumber>,
-    #[schemars(skip_serializing_if = "Option::is_none")]
-    count: Option<u32>,
-    #[schemars(skip_serializing_if = "Option::is_none")]
-    center: Option<[JsonNumber; 3]>,
-    #[schemars(skip_serializing_if = "Option::is_none")]
-    radius: Option<JsonNumber>,
-    #[schemars(skip_serializing_if = "Option::is_none")]
-    delta: Option<[JsonNumber; 3]>,
-    #[schemars(skip_serializing_if = "Option::is_none")]
-    limit: Option<JsonNumber>,
-    #[schemars(skip_serializing_if = "Option::is_none")]
-    constraint: Option<u32>,
-    #[schemars(skip_serializing_if = "Option::is_none")]
-    from: Option<[JsonNumber; 3]>,
-    #[schemars(skip_serializing_if = "Option::is_none")]
-    to: Option<[JsonNumber; 3]>,
-    #[schemars(skip_serializing_if = "Option::is_none")]
-    direction: Option<[JsonNumber; 3]>,
-    #[schemars(skip_serializing_if = "Option::is_none")]
-    anchor: Option<u32>,
-    #[schemars(skip_serializing_if = "Option::is_none")]
-    collider: Option<u32>,
-    #[schemars(skip_serializing_if = "Option::is_none")]
-    translation: Option<[JsonNumber; 3]>,
-    #[schemars(skip_serializing_if = "Option::is_none")]
-    rotation: Option<[JsonNumber; 4]>,
-    #[schemars(skip_serializing_if = "Option::is_none")]
-    velocity: Option<[JsonNumber; 3]>,
-    #[schemars(skip_serializing_if = "Option::is_none")]
-    angular_velocity: Option<[JsonNumber; 3]>,
-    #[schemars(skip_serializing_if = "Option::is_none")]
-    torque: Option<[JsonNumber; 3]>,
-    #[schemars(skip_serializing_if = "Option::is_none")]
-    parameter: Option<String>,
-    #[schemars(skip_serializing_if = "Option::is_none")]
-    value: Option<ParameterValueSchema>,
-    #[schemars(skip_serializing_if = "Option::is_none")]
-    constraint_kind: Option<String>,
-    #[schemars(skip_serializing_if = "Option::is_none")]
-    block: Option<u32>,
-    #[schemars(skip_serializing_if = "Option::is_none")]
-    scene: Option<String>,
-    #[schemars(skip_serializing_if = "Option::is_none")]
-    to_step: Option<u64>,
-    #[schemars(skip_serializing_if = "Option::is_none")]
-    back_steps: Option<u32>,
-    #[schemars(skip_serializing_if = "Option::is_none")]
-    contents: Option<String>,
-    #[schemars(skip_serializing_if = "Option::is_none")]
-    state_hash: Option<String>,
-    #[schemars(skip_serializing_if = "Option::is_none")]
-    text: Option<String>,
-    #[schemars(skip_serializing_if = "Option::is_none")]
-    object: Option<String>,
-    #[schemars(skip_serializing_if = "Option::is_none")]
-    object_index: Option<u32>,
-    #[schemars(skip_serializing_if = "Option::is_none")]
-    path: Option<Vec<PathPointSchema>>,
-    #[schemars(skip_serializing_if = "Option::is_none")]
-    append: Option<bool>,
+/// The schema of a command, from the table of actions. A field can have several forms.
+struct ActionSchema;
+
+impl JsonSchema for ActionSchema {
+    fn schema_name() -> Cow<'static, str> {
+        "Action".into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        let mut properties = BTreeMap::from([("kind", vec![generator.subschema_for::<String>()])]);
+        for field in ACTIONS.iter().flat_map(|info| info.fields) {
+            let schema = schema_of(field.form, generator);
+            let forms = properties.entry(field.name).or_default();
+            if !forms.contains(&schema) {
+                forms.push(schema);
+            }
+        }
+        let properties = properties.into_iter().map(|(name, forms)| match &forms[..] {
+            [schema] => (name.to_owned(), schema.clone().to_value()),
+            forms => (name.to_owned(), json!({ "anyOf": forms })),
+        });
+        let properties: Map<_, _> = properties.collect();
+        json_schema!({ "type": "object", "properties": properties, "required": ["kind"] })
+    }
+}
+
+fn schema_of(form: FieldForm, generator: &mut SchemaGenerator) -> Schema {
+    let number = generator.subschema_for::<JsonNumber>();
+    let vector = generator.subschema_for::<[JsonNumber; 3]>();
+    match form {
+        FieldForm::Whole => generator.subschema_for::<u32>(),
+        FieldForm::Long => generator.subschema_for::<u64>(),
+        FieldForm::Number => number,
+        FieldForm::Flag => generator.subschema_for::<bool>(),
+        FieldForm::Vector => vector,
+        FieldForm::Rotation => generator.subschema_for::<[JsonNumber; 4]>(),
+        FieldForm::Value => json_schema!({ "anyOf": [number, vector] }),
+        FieldForm::Path => generator.subschema_for::<Vec<PathPointSchema>>(),
+        FieldForm::Text
+        | FieldForm::Kind
+        | FieldForm::Object
+        | FieldForm::Contents
+        | FieldForm::Hash => generator.subschema_for::<String>(),
+    }
 }
 
 /// The schema of a point of a path.
@@ -185,24 +160,6 @@ struct PathPointSchema {
     time: JsonNumber,
     translation: [JsonNumber; 3],
     rotation: [JsonNumber; 4],
-}
-
-/// The schema of `force`: of a release, or on a body.
-#[derive(JsonSchema)]
-#[schemars(untagged, rename = "Force")]
-#[allow(dead_code, reason = "only its schema is used")]
-enum ForceSchema {
-    Release(bool),
-    Body([JsonNumber; 3]),
-}
-
-/// The schema of a parameter's value. No value means off.
-#[derive(JsonSchema)]
-#[schemars(untagged, rename = "ParameterValue")]
-#[allow(dead_code, reason = "only its schema is used")]
-enum ParameterValueSchema {
-    Number(JsonNumber),
-    Vector([JsonNumber; 3]),
 }
 
 #[cfg(test)]

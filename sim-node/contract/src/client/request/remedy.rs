@@ -89,8 +89,6 @@ fn missing_condition(action: &Action) -> Option<&'static str> {
 
 #[cfg(test)]
 mod tests {
-    use sim_types::{ParameterValue, Text};
-
     use super::*;
     use crate::messages::command::Command;
     use crate::messages::outcome::OUTCOME_FLAG_CONTROL;
@@ -102,9 +100,7 @@ mod tests {
 
     #[test]
     fn a_rejection_names_the_allowed_values_or_the_missing_condition() {
-        let (parameter, value) = (Text::cut("tear_force"), ParameterValue::Number(-1.0));
-        let set =
-            Action::Set { parameter, value, constraint_kind: None, block: None, collider: None };
+        let set = Action::set("tear_force", -1.0);
         let allowed = "allowed: a number > 0, or off for no limit";
         assert_eq!(remedy(set, Reason::OutOfRange, 0).as_deref(), Some(allowed));
         let frozen = "the particle is frozen; a reset restores it";

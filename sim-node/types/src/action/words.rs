@@ -1,8 +1,37 @@
-//! The kinds of constraints that a `set` addresses.
+//! Words in the fields of actions.
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::constraint_kind::ConstraintKind;
+use crate::names::names;
+
+/// Object that a command `follow` moves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[repr(u32)]
+pub enum MovedObject {
+    /// A particle that the client has grabbed.
+    Particle = 0,
+    /// An anchor.
+    Anchor = 1,
+    /// A collider.
+    Collider = 2,
+}
+
+names!(MovedObject: Particle = "particle", Anchor = "anchor", Collider = "collider");
+
+/// Part of a state that a restore puts in place.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[repr(u32)]
+pub enum RestoreContents {
+    /// The complete state: particles and keyframe.
+    State = 1,
+    /// Positions and velocities. Everything else stays.
+    Motion = 2,
+}
+
+names!(RestoreContents: State = "state", Motion = "motion");
 
 /// The kind of constraints that a `set` addresses. Its JSON form is the name of the kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
