@@ -190,12 +190,8 @@ fn is_free(topic: Topic, what: &str, before: &[u8], after: &[u8]) -> bool {
         },
         // A recorder does not know the causes of tears that it has missed.
         Topic::Tears => what == "no causes" || after.windows(9).any(|one| one == br#""unknown""#),
-        // A missing key is off.
-        Topic::Parameters => {
-            what == "/time_scale"
-                || what.starts_with("no contact")
-                || what.starts_with("no bending")
-        }
+        // A missing key has its default, which most of them have.
+        Topic::Parameters => what == "/time_scale" || what.starts_with("no "),
         Topic::Keyframe => is_only_paused(before, after),
         // The details of a collider are those of the scene.
         Topic::Colliders => ["/path", "/solid"].iter().any(|field| what.ends_with(field)),
