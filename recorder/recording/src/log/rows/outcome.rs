@@ -142,7 +142,7 @@ fn schema_of(form: FieldForm, generator: &mut SchemaGenerator) -> Schema {
         FieldForm::Flag => generator.subschema_for::<bool>(),
         FieldForm::Vector => vector,
         FieldForm::Rotation => generator.subschema_for::<[JsonNumber; 4]>(),
-        FieldForm::Value => json_schema!({ "anyOf": [number, vector] }),
+        FieldForm::Value => json_schema!({ "anyOf": [number, vector, { "type": "null" }] }),
         FieldForm::Path => generator.subschema_for::<Vec<PathPointSchema>>(),
         FieldForm::Text
         | FieldForm::Kind
