@@ -69,7 +69,9 @@ pub(crate) const SETTING_SIZE_BYTES_MAX: usize = 1 + (1 + 5) + (1 + 3 * 4);
 
 impl Clone for Parameters {
     fn clone(&self) -> Self {
-        Self { values: self.values.clone(), surfaces: self.surfaces.clone() }
+        let mut copy = Self { values: self.values.clone(), surfaces: self.surfaces.clone() };
+        copy.make_room_for(self.values.bending_by_block.capacity());
+        copy
     }
 
     /// Allocates nothing if both belong to the same scene.
