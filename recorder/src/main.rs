@@ -1,6 +1,7 @@
 //! `recorder`: records a simulation into MCAP, plays it back, simulates without a node, and proves
 //! that a recording can be re-simulated bit for bit.
 #![forbid(unsafe_code)]
+#![allow(rustdoc::invalid_html_tags, reason = "help texts are plain text")]
 
 mod cli;
 mod commands;

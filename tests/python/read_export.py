@@ -62,6 +62,9 @@ class Recording:
         generated = tomllib.loads(scene.decode())["generate"]
         self.mesh = generated[0] if len(generated) == 1 and "faces" in generated[0] else {}
         self.mesh |= {key: index_lists(self.mesh[key]) for key in ("faces", "face_uvs") if key in self.mesh}
+        if "uvs" in self.mesh:
+            numbers = np.frombuffer(base64.b64decode(self.mesh["uvs"], validate=True), "<f4")
+            self.mesh["uvs"] = numbers.reshape(-1, 2)
         self.faces = self.mesh.get("faces", self.triangles.tolist())
 
     def index(self, step):

@@ -43,7 +43,7 @@ pub struct ActionInfo {
 /// limits, these in words. A field has its meaning, its form in JSON if that is not the one of its type, its name, its type
 /// and its row in the table.
 ///
-/// ```ignore
+/// ```text
 /// /// Makes a paused node perform `count` steps.
 /// Step = 8 "step", "1 or more" {
 ///     /// Number of steps.

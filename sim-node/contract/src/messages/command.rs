@@ -24,7 +24,7 @@ pub struct Command {
     /// Number of the command among those of its client, ascending, below 2^53.
     pub sequence: u64,
     /// Fields of the kind, one after the other, without gaps; then zeros.
-    pub fields: [u8; Action::FIELDS_SIZE_BYTES],
+    pub fields: [u8; 232],
 }
 
 const _: () = assert!(size_of::<Command>() == 256 && align_of::<Command>() == 8);

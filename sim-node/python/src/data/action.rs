@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use sim_contract::{
-    ActionInfo, ConstraintKind, GRAB_OVER_S_DEFAULT, KindFilter, MovedObject, PathError,
-    PathPoint, Text, read_scene_file,
+    ActionInfo, ConstraintKind, GRAB_OVER_S_DEFAULT, KindFilter, MovedObject, PathError, PathPoint,
+    Text, read_scene_file,
 };
 use sim_solver::Scene;
 use sim_solver::scene::is_path;
