@@ -336,7 +336,7 @@ typedef struct {
   // Number of the command among those of its client, ascending, below 2^53.
   uint64_t sequence;
   // Fields of the kind, one after the other, without gaps; then zeros.
-  uint8_t fields[CATENARY_FIELDS_SIZE_BYTES];
+  uint8_t fields[232];
 } catenary_command;
 
 // Header of `forces`: 24 bytes, alignment 8. The payload has a row for each collider, then for each anchor,
