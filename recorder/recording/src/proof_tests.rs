@@ -411,7 +411,7 @@ fn parts_side_by_side_give_the_report_of_one_thread() {
         let file = edited(flipped_step, damaged_keyframe);
         let alone = verified(&file, 1);
         assert_eq!(alone.step, step, "{alone}");
-        for threads in [2, 3, 8] {
+        for threads in [0, 2, 3, 8] {
             assert_eq!(verified(&file, threads), alone, "{threads} threads");
         }
     }

@@ -74,7 +74,8 @@ pub struct StepRange {
 /// Options of a verification.
 #[derive(Debug, Clone, Copy)]
 pub struct VerifyOptions {
-    /// Parts of the recording that are simulated at the same time, each by one thread. At least 1.
+    /// Number of threads that simulate; 0 counts as 1. Each simulates a part of the recording. Where the parts of a large
+    /// scene do not fit in memory side by side, the threads share the solver of one part.
     pub threads: usize,
     /// The steps to compare.
     pub range: StepRange,
@@ -110,7 +111,8 @@ pub fn verify<R: Read>(
     })?;
     let has_started = !results.is_empty();
     report.add_parts(results);
-    // How far the file was read meanwhile depends on the threads.
+    // When the first difference stops the reading depends on the threads, so a report of a difference
+    // contains nothing from the rest of the file.
     if report.verdict == Verdict::Diverged {
         Ok(report)
     } else {
@@ -210,7 +212,7 @@ impl<'a, R: Read> Reading<'a, R> {
         parts.add(frame)
     }
 
-    /// Compares the constraints and triangles of the file with those of the scene.
+    /// Compares the messages on /topology and /surface with the constraints and triangles of the scene.
     fn check_load(&mut self, frame: &Frame) -> Option<SnapshotFinding> {
         let is_load = |one: &&Message| matches!(one, Message::Topology(_) | Message::Surface(_));
         let mut rows = frame.updates.iter().filter(is_load).peekable();

@@ -20,7 +20,7 @@ pub(crate) struct ThreadArgs {
 /// The option of the subcommand that simulates the parts of a recording side by side.
 #[derive(Debug, clap::Args)]
 pub(crate) struct PartArgs {
-    /// Parts of the recording to simulate at the same time, each on one core, 1 to 64. Default: the number of cores
+    /// Number of threads that simulate parts of the recording side by side, 1 to 64. Default: the number of cores
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = thread_count)]
     threads: Option<usize>,
 }

@@ -313,8 +313,8 @@ impl Tape {
         Ok(tracker.torn().cloned().unwrap_or_default())
     }
 
-    /// Returns the torn constraints to start from: those of the newest keyframe, or
-    /// those at the start of the file.
+    /// Returns the torn constraints to start from: the list in the newest keyframe, or the constraints
+    /// that were torn at the start of the file.
     fn torn_base(&mut self, chunk: usize, step: u64) -> Result<TornBase, ReadError> {
         let from_start = TornBase { chunk: 0, step: None, torn: self.topology.torn_before() };
         for chunk in self.reader.chunks.with_topic(Topic::Keyframe).backward_from(chunk) {

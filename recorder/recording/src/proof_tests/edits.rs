@@ -193,7 +193,7 @@ fn is_free(topic: Topic, what: &str, before: &[u8], after: &[u8]) -> bool {
         // A missing key has its default, which most of them have.
         Topic::Parameters => what == "/time_scale" || what.starts_with("no "),
         Topic::Keyframe => is_only_paused(before, after),
-        // The details of a collider are those of the scene.
+        // The path and solidity of a collider are in the scene, which the simulation reads.
         Topic::Colliders => ["/path", "/solid"].iter().any(|field| what.ends_with(field)),
         _ => false,
     }

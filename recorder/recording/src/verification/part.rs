@@ -134,6 +134,7 @@ impl Parts {
         let (spare, spares) = channel();
         let part_size_bytes =
             loaded.particle_count() * size_of::<ParticleState>() * PART_SNAPSHOTS_MIN;
+        let thread_count = thread_count.max(1);
         let part_count = (WAITING_SIZE_BYTES_MAX / part_size_bytes.max(1)).clamp(1, thread_count);
         for _ in 0..part_count {
             let worker = Worker {

@@ -73,7 +73,8 @@ impl Resimulation {
         Self::start_with(Solver::new(scene), frame).map(Some)
     }
 
-    /// Starts at a complete state with a solver of its scene, which at step 0 is that of the scene at load.
+    /// Starts at a complete state with a solver of its scene. At step 0 the solver must be the one that the
+    /// scene makes at load.
     pub(super) fn start_with(mut solver: Solver, frame: &Frame) -> Result<Self, ResimulationError> {
         let step = frame.row.step;
         let bytes = frame.own_keyframe().unwrap_or_default();

@@ -34,8 +34,8 @@ pub(super) fn newest_rows(first: &Frame) -> Vec<Message> {
     rows.into_iter().chain([keyframe]).flatten().cloned().collect()
 }
 
-/// Replaces the velocities of colliders by those of a restored solver, which does not know the motion
-/// that led to its state.
+/// Replaces the recorded velocities of colliders by the velocities in a restored solver, which does not
+/// know the motion that led to its state.
 pub(super) fn ignore_collider_velocities(rows: &mut [Message], solver: &Solver) {
     for row in rows {
         let Message::Colliders(row) = row else { continue };
@@ -67,7 +67,7 @@ fn compare_keyframe(bytes: &[u8], solver: &Solver) -> Option<String> {
 }
 
 /// Compares the newest tears. A recorder that missed a list writes all tears since the previous one
-/// in one row: those of this step, and the newest of the steps before.
+/// in one row: the tears of this step, and the newest tears of the steps before.
 fn compare_tears(recorded: &TearsRow, solver: &Solver) -> Option<String> {
     let count = recorded.constraints.len().max(solver.new_torn_count());
     let simulated = newest_tears_row(solver, recorded.step, count);

@@ -157,7 +157,8 @@ impl Feed {
         let has_snapshot = self.accepted.contents.iter().any(is_snapshot);
         self.enqueue();
         if self.is_paused && !(was_paused && has_snapshot) {
-            // What follows during the pause waits for no other snapshot.
+            // No other snapshot comes during the pause, so the messages behind this snapshot must not
+            // wait for one.
             self.push_last_snapshot();
         }
         self.end_part_early();

@@ -62,7 +62,7 @@ pub(super) struct Selector {
     in_place_step: Option<u64>,
     /// The newest snapshot with the time of its reception, if it was left out.
     last_left_out: Option<(StepRow, ParticleBuffer, u64)>,
-    /// The messages of later steps, until it is known whether that snapshot is recorded before them.
+    /// The messages behind that snapshot, until it is known whether the snapshot is recorded before them.
     waiting: Vec<Item>,
     /// Only `left_out` is set.
     counts: AllCounts,
