@@ -3,14 +3,19 @@
 //! The recorder's library reads the expected states from the start of the file.
 
 use std::path::Path;
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, SystemTime};
 
 use integration_tests::{Process, Program, Sandbox, ctl, record};
 use recording::{Frame, FrameReader, LogReader, Message as Logged, RunDescription};
 use serde_json::{Value, json};
-use sim_contract::ParticleFlags;
+use sim_contract::{ParticleFlags, Stop};
+use viewer_bridge::request::requests;
+use viewer_bridge::sink::{Demand, Sink, Update};
+use viewer_bridge::source::replay::{GhostChoice, InitialPlayback, Replay};
 use viewer_bridge::wire::frame_flag::PAUSED;
 use viewer_bridge::wire::{FlaggedParticle, Message};
+use viewer_bridge::{Shutdown, Sinks, Source};
 
 use super::page::{Bridge, Page};
 
@@ -228,6 +233,49 @@ fn change_one_particle(from: &str, to: &str, changed_step: u64) {
         copy.write(&logged.message, logged.log_time_ns).unwrap();
     }
     copy.finish(&recording::Closing::default()).unwrap();
+}
+
+/// The kinds of texts that a source publishes, in order.
+#[derive(Debug, Default)]
+struct Kinds(Mutex<Vec<&'static str>>);
+
+impl Sink for Kinds {
+    fn has_demand(&self, _: Demand) -> bool {
+        false
+    }
+
+    fn publish(&self, update: &Update<'_>) {
+        self.0.lock().unwrap().push(match update {
+            Update::Node(_) => "node",
+            Update::Parameters(_) => "parameters",
+            Update::Timeline(_) => "timeline",
+            Update::Playback(_) => "playback",
+            Update::Ghost(_) => "ghost",
+            _ => return,
+        });
+    }
+}
+
+#[test]
+fn a_page_receives_the_first_texts_in_one_order_whenever_it_arrives() {
+    let sandbox = Sandbox::new();
+    let file = recording(&sandbox);
+    let bridge = Bridge::start_with(&sandbox, &["--replay", &file]);
+    bridge.page().frame(|_| true);
+    let mut late = bridge.page();
+    let kind = |page: &mut Page| page.text(|_| true)["type"].as_str().unwrap().to_owned();
+    let of_late_page: Vec<_> = (0..5).map(|_| kind(&mut late)).collect();
+
+    // A page that was there before the source receives what the source publishes.
+    let (ghosts, start) = (GhostChoice::default(), InitialPlayback::Paused);
+    let path = Path::new(&file);
+    let mut replay = Replay::open(path, start, ghosts, &Stop::default(), &mut |_| {}).unwrap();
+    let (shutdown, kinds) = (Shutdown::default(), Arc::new(Kinds::default()));
+    let mut sinks = Sinks::new(shutdown.clone());
+    sinks.add(Arc::<Kinds>::clone(&kinds));
+    shutdown.begin();
+    replay.run(&sinks, &requests().1).unwrap();
+    assert_eq!(*kinds.0.lock().unwrap(), of_late_page);
 }
 
 #[test]

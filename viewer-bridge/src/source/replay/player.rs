@@ -108,6 +108,8 @@ impl<'a> Player<'a> {
     /// Plays until the program ends.
     pub(super) fn run(mut self, requests: &Requests) -> Result<(), ReadError> {
         let scene = self.recording.load.to_scene(self.state.row.step, &self.state.particles);
+        // The order in which the hub sends them to a page that arrives later.
+        self.publish_node();
         self.publish_timeline();
         self.publish_playback();
         self.publish_ghost();
@@ -126,6 +128,7 @@ impl<'a> Player<'a> {
                 self.read_state(now_ns)?;
             }
             if self.is_playback_changed {
+                self.publish_node();
                 self.publish_playback();
             }
             self.show(now_ns);
@@ -296,8 +299,8 @@ impl<'a> Player<'a> {
         self.publish_parameters();
     }
 
-    /// Publishes the parameters at this step, if they have changed. Recordings before format 3 lack
-    /// them; then those of the scene are shown as incomplete.
+    /// Publishes the parameters at this step, if they have changed. Those of the scene, as incomplete, where the
+    /// recording lacks them.
     fn publish_parameters(&mut self) {
         let initial = self.recording.load.summary.parameters.clone();
         let recorded = self.state.parameters.as_ref().map(|row| row.values.clone());
@@ -376,12 +379,16 @@ impl<'a> Player<'a> {
         self.sinks.publish(&Update::Ghost(self.ghosts.text()));
     }
 
+    /// Publishes the state and the parameters of the node that a recording stands for.
+    fn publish_node(&mut self) {
+        self.sinks.publish(&Update::Node(&texts::node(self.recording, &self.playhead)));
+        self.publish_parameters();
+    }
+
     fn publish_playback(&mut self) {
         self.is_playback_changed = false;
         let playback = texts::playback(self.recording, &self.playhead, self.state.row.step);
         self.sinks.publish(&Update::Playback(&playback));
-        self.sinks.publish(&Update::Node(&texts::node(self.recording, &self.playhead)));
-        self.publish_parameters();
     }
 
     fn publish_statistics_if_due(&mut self, now_ns: u64) {
