@@ -41,8 +41,9 @@ fn a_ball_follows_the_mouse_and_glides_on_when_it_is_thrown() {
 
     // A throw back to the left.
     let back = [to[0] - 60.0, to[1]];
-    tab.stroke(to, [to[0] - 30.0, to[1]], 4);
-    tab.fling(back);
+    let middle = [to[0] - 30.0, to[1]];
+    tab.stroke(to, middle, 4);
+    tab.fling(middle, back);
     let dropped = x - 60.0 / unit;
     tab.wait(&format!("{CENTER}[0] < {dropped} - 0.02"));
     // It comes to rest: steps go on, and it does not.

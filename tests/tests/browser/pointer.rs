@@ -80,8 +80,9 @@ fn a_released_particle_keeps_the_velocity_of_the_pointer() {
     let from = camera.project(rig.state().particles[corner].position);
     rig.tab.press(from, Button::Left);
     rig.wait_for_state("the grab", |state| is_grabbed(&state.particles[corner]));
-    rig.tab.stroke(from, [from[0] - 12.0, from[1]], 4);
-    rig.tab.fling([from[0] - 24.0, from[1]]);
+    let middle = [from[0] - 12.0, from[1]];
+    rig.tab.stroke(from, middle, 4);
+    rig.tab.fling(middle, [from[0] - 24.0, from[1]]);
     let first = rig.wait_for_state("the release", |state| {
         let particle = &state.particles[corner];
         particle.position[0] < -0.61 && !is_grabbed(particle)

@@ -2,7 +2,7 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { pageOf, sceneOf } from "./tools/page.js";
+import { VIEWPORT, pageOf, sceneOf } from "./tools/page.js";
 
 const SCENE = sceneOf([0, 0, 0]);
 
@@ -40,7 +40,7 @@ test("a motion after a rest is as quick as one without", () => {
   input.tick(start + 16);
   // The pointer rests for a second.
   for (let ms = 32; ms <= 1000; ms += 16) input.tick(start + ms);
-  input.tool.move({ x: 500, y: 300 });
+  input.tool.move({ x: 500, y: 300 }, start + 1010);
   input.tick(start + 1016);
   assert.equal(moves().length, 2);
   assert.ok(moves()[1].over_s < 0.03, `${moves()[1].over_s} s`);
@@ -111,6 +111,18 @@ test("a busy page decides by the times of the events, not by those of their arri
   press.listeners.get("pointerup")({ ...finger, type: "pointerup" });
   assert.deepEqual(press.sent.map(({ type }) => type), ["pin"]);
   assert.deepEqual(press.selection.items, []);
+  // All events of a throw arrive together.
+  const thrown = shown();
+  const [{ event, listeners, sent }, beginMs] = [thrown, thrown.event.timeStamp - 1000];
+  const at = (type, ms, pixels) => listeners.get(type)({ ...event, type, timeStamp: beginMs + ms, clientX: event.clientX + pixels });
+  at("pointerdown", 0, 0);
+  at("pointermove", 400, 20);
+  at("pointermove", 440, 60);
+  at("pointerup", 441, 60);
+  const move = sent.find(({ type }) => type === "move");
+  const target = thrown.camera.project(move.target, VIEWPORT);
+  const pixelsPerS = (60 - 20 * (360 / 400)) / 0.08;
+  assert.ok(Math.abs(target.x - (event.clientX + 60 + pixelsPerS * move.over_s)) < 0.1, `x ${target.x} px`);
 });
 
 test("a timer that was held up waits for the release behind it", (context) => {

@@ -15,6 +15,8 @@ use super::picture::{Area, Picture};
 
 /// Width and height of the window in CSS pixels: wide enough for the panel beside the picture.
 const SIZE: [u32; 2] = [800, 600];
+/// Duration of a fling, in s.
+const FLING_S: f64 = 0.03;
 /// An expression for the state of the page that a failing test prints.
 const STATE: &str = "(({ step, frame, framesDrawn, scene, connection, node, paused, torn, banner, notices, faults, \
     unanswered, renderer }) => ({ step, frame, framesDrawn, scene, connection, node, paused, torn, banner, notices, \
@@ -236,11 +238,19 @@ impl Tab {
         self.pressed.set(Button::None);
     }
 
-    /// Moves the pointer and releases the button in motion: the page receives both events together,
-    /// however busy it is.
-    pub(crate) fn fling(&self, at: [f64; 2]) {
-        for kind in ["mouseMoved", "mouseReleased"] {
-            let event = self.mouse_event(kind, at, u32::from(kind == "mouseReleased"));
+    /// Moves the pointer within [`FLING_S`] and releases the button in motion. The events carry their times, so that
+    /// the velocity does not depend on how busy the page is.
+    pub(crate) fn fling(&self, from: [f64; 2], to: [f64; 2]) {
+        let begin_s = self.number("(performance.timeOrigin + performance.now()) / 1000");
+        let event = |kind, at, clicks, seconds: f64| {
+            let mut event = self.mouse_event(kind, at, clicks);
+            event["timestamp"] = json!(begin_s + seconds);
+            event
+        };
+        self.call("Input.dispatchMouseEvent", event("mouseMoved", from, 0, 0.0));
+        // The page receives both together.
+        for (kind, clicks) in [("mouseMoved", 0), ("mouseReleased", 1)] {
+            let event = event(kind, to, clicks, FLING_S);
             self.browser.post(&self.session, "Input.dispatchMouseEvent", event);
         }
         self.pressed.set(Button::None);

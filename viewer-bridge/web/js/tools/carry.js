@@ -31,8 +31,9 @@ export class CarryTool extends PressTool {
     if (!this.isRefused) this.app.commands.stream("carry", { ...this.carried, offset: subtract(target, this.from), over_s });
   }
 
-  end() {
-    this.release(this.velocity(performance.now()));
+  /** @param {number} ms */
+  end(ms) {
+    this.release(this.velocity(ms));
   }
 
   /** Puts the object down: it only reaches its last target. */

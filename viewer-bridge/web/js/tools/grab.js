@@ -31,10 +31,10 @@ export class GrabTool extends PressTool {
 
   /** Releases the particle. It keeps the velocity of its last step, but the last motion sent may have
    * ended by then, or not have begun. So the target first moves on at the velocity of the pointer, and
-   * the release follows once the node has applied that. */
-  end() {
+   * the release follows once the node has applied that. @param {number} ms */
+  end(ms) {
     if (!this.isBegun) return;
-    const velocity = this.velocity(performance.now());
+    const velocity = this.velocity(ms);
     if (length(velocity) === 0) {
       this.tick(performance.now());
       this.release();

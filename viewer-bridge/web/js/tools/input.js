@@ -101,8 +101,7 @@ export class Input {
       return;
     }
     this.tool = this.begin(event, at);
-    // The page may have been busy since the press.
-    if (this.tool instanceof PressTool) this.tool.pressedMs = event.timeStamp;
+    if (this.tool instanceof PressTool) this.tool.setPressed(event.timeStamp);
     const isView = this.tool instanceof ViewTool;
     this.click = event.button === 0 && (isView || this.tool instanceof PressTool) && (this.mode === "grab" || !this.canChange()) ? at : null;
     if (!isView) {
@@ -159,7 +158,7 @@ export class Input {
     if (this.click !== null && distance(this.click, at) > CLICK_PIXELS) this.click = null;
     if (this.pointers.size === 2) this.pinch(event.pointerId, before, at);
     this.pointers.set(event.pointerId, at);
-    this.tool?.move(at);
+    this.tool?.move(at, event.timeStamp);
   }
 
   /** Zooms and pans with two fingers: the point between them stays between them. @param {number} id @param {Pixel} before @param {Pixel} at */
@@ -183,7 +182,7 @@ export class Input {
     this.click = null;
     // The timer of a busy page may not have come to it.
     if (event.type === "pointerup" && event.pointerType === "touch" && tool instanceof PressTool && heldMs >= LONG_PRESS_MS && this.pinPressed(tool)) return;
-    this.finish();
+    this.finish(event.timeStamp);
     if (click !== null) this.select(click, event);
   }
 
@@ -207,9 +206,9 @@ export class Input {
     return this.tool instanceof GrabTool && this.tool.isRefused;
   }
 
-  /** Ends the tool in use; a grab releases its particle, and an object is put down or thrown. */
-  finish() {
-    this.tool?.end();
+  /** Ends the tool in use; a grab releases its particle, and an object is put down or thrown. @param {number} ms time of the release */
+  finish(ms = performance.now()) {
+    this.tool?.end(ms);
     this.tool = null;
     this.app.renderer.isDirty = true;
   }

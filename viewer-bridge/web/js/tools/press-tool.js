@@ -36,6 +36,12 @@ export class PressTool {
     this.isRefused = false;
   }
 
+  /** Sets the time of the press, which a busy page sees later. @param {number} ms */
+  setPressed(ms) {
+    this.pressedMs = ms;
+    this.trail[0].ms = ms;
+  }
+
   begin() {
     if (this.isBegun) return;
     this.isBegun = true;
@@ -53,11 +59,10 @@ export class PressTool {
     this.origin = origin;
   }
 
-  /** @param {Pixel} to */
-  move(to) {
+  /** @param {Pixel} to @param {number} ms */
+  move(to, ms) {
     this.pointer = to;
     this.isMoved = true;
-    const ms = performance.now();
     this.trail.push({ ms, at: to });
     while (this.trail.length > 1 && this.trail[1].ms < ms - VELOCITY_MS) this.trail.shift();
     if (Math.hypot(to.x - this.start.x, to.y - this.start.y) > CLICK_PIXELS) this.begin();
@@ -83,10 +88,10 @@ export class PressTool {
     return camera.intersectFacingPlane(at.x, at.y, renderer.viewport, this.origin);
   }
 
-  /** Velocity of the recent motion, in scene units per second. @param {number} nowMs @returns {Vec3} */
-  velocity(nowMs) {
+  /** Velocity of the pointer at a time, in scene units per second. @param {number} ms @returns {Vec3} */
+  velocity(ms) {
     const last = this.trail[this.trail.length - 1];
-    if (last.ms < nowMs - VELOCITY_MS) return [0, 0, 0];
+    if (last.ms < ms - VELOCITY_MS) return [0, 0, 0];
     const begin = Math.max(this.trail[0].ms, last.ms - VELOCITY_MS);
     const span = Math.max(last.ms - begin, VELOCITY_MS_MIN);
     return scale(subtract(this.targetAt(last.at), this.targetAt(this.pointerAt(begin))), 1000 / span);

@@ -6,7 +6,7 @@ import { particlesWithin, pickParticle } from "../geometry/pick.js";
 /** @typedef {import("../geometry/pick.js").Pixel} Pixel */
 /** The parts of the page that tools act on. @typedef {{ simulation: import("../state/simulation.js").Simulation, camera: import("../geometry/camera.js").Camera, renderer: import("../gl/renderer.js").Renderer, commands: import("../net/commands.js").Commands, selection: import("../state/selection.js").Selection }} App */
 /** A press. `end` completes it; `cancel` ends it when the scene changes under it, without its last motion.
- * @typedef {{ start: Pixel, move(to: Pixel): void, tick(nowMs: number): void, end(): void, cancel(): void, describe(): Trace }} Tool */
+ * @typedef {{ start: Pixel, move(to: Pixel, ms: number): void, tick(nowMs: number): void, end(ms: number): void, cancel(): void, describe(): Trace }} Tool */
 /** The trace of a tool on the overlay. @typedef {{ line?: { particle: number, to: Pixel }, circle?: { at: Pixel, radius: number }, stroke?: Pixel[] }} Trace */
 
 /** Radius in CSS pixels within which a mouse and a finger pick a particle. */
