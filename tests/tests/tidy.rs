@@ -10,11 +10,12 @@ mod module_graph;
 
 /// The allowed dependencies: each crate with the workspace crates and restricted libraries it may use.
 /// Every crate also uses `build-features`, which has no code.
-const ARROWS: [(&str, &[&str]); 11] = [
+const ARROWS: [(&str, &[&str]); 12] = [
     ("sim-types", &[]),
     ("sim-solver", &["sim-types"]),
     ("sim-contract", &["iceoryx2", "sim-types"]),
     ("sim-c", &["sim-contract"]),
+    ("catenary-python", &["recording", "sim-contract", "sim-solver"]),
     ("sim-cli", &["sim-contract", "sim-types"]),
     ("sim-lessons", &["sim-solver"]),
     ("sim-node", &["sim-cli", "sim-contract", "sim-lessons", "sim-solver"]),

@@ -3,6 +3,13 @@
 //! It wraps the client, the solver and the reader of recordings in Python classes. Particles stay where
 //! they are: arrays are views of shared memory, or of the memory of a [`data::snapshot::Snapshot`]. Every call
 //! that waits or computes lets other threads of the interpreter run, and a signal such as Ctrl-C ends it early.
+#![deny(unsafe_code)]
+#![allow(
+    clippy::doc_markdown,
+    clippy::needless_pass_by_value,
+    clippy::unnecessary_wraps,
+    reason = "texts for Python are not Markdown; PyO3 passes arguments by value and wants results of methods that may raise"
+)]
 
 mod arguments;
 mod attach;
