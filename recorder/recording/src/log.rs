@@ -6,10 +6,13 @@ mod command_file;
 mod container;
 pub(crate) mod encoding;
 mod index;
+mod input_file;
 mod message;
 mod read;
+mod read_error;
 mod rows;
 mod run;
+mod scanner;
 mod state_hash;
 mod tape;
 mod tears;
@@ -30,14 +33,13 @@ pub use encoding::{
     encode_transform, map_from_world, scene_format,
 };
 pub use index::{ChunkEntry, IndexedLog};
+pub use input_file::{FileSource, open_recording, open_regular_file};
 pub use message::Message;
 pub use read::decode::LoggedMessage;
-pub use read::file_source::{FileSource, SharedFile};
 pub use read::frames::{Frame, FrameReader};
 pub use read::gaps::GapCounter;
-pub use read::open::open_regular_file;
-pub use read::read_error::{LogEnd, ReadError};
-pub use read::reader::{LogReader, open_recording};
+pub use read::reader::LogReader;
+pub use read_error::{LogEnd, ReadError};
 pub use rows::{
     AnchorForceRow, BendColumns, ColliderBodyRow, ColliderDetails, ColliderForceRow, ColliderRow,
     CollidersRow, EnergyRow, EventRow, ForcesRow, MeshFile, OutcomeRow, ParametersRow,

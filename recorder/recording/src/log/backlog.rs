@@ -1,8 +1,8 @@
 //! The memory of messages that wait for their snapshot.
 
 use super::message::Message;
-use super::read::limits::SizeLimits;
 use super::run::RunDescription;
+use super::scanner::limits::SizeLimits;
 use super::topic::Topic;
 
 /// The memory of the messages since the last snapshot.

@@ -1,18 +1,14 @@
 //! The whole of a file, record by record and with the position of each: for checks and repairs.
 //!
-//! [`super::read`] reads a recording up to its first damage. This module goes on behind it.
+//! [`super::read`] reads a recording up to its first damage. This module goes on behind the damage.
 
-mod attachment;
 pub(super) mod check;
-mod chunk;
 mod content;
 pub(super) mod finding;
 pub(super) mod losses;
 pub(super) mod lost_load;
 mod places;
 pub(super) mod repair;
-mod salvage;
+mod repair_writer;
 mod summary;
 mod tears;
-mod walk;
-mod window;

@@ -4,9 +4,7 @@
 //! without an end (its recorder was killed or is still writing) is scanned from record to record
 //! instead. The scan reads only the headers of the records.
 
-mod chunk;
-mod scan;
-mod summary;
+mod located;
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -19,17 +17,18 @@ use mcap::records::{Record, op};
 
 use sim_contract::Stop;
 
+use super::input_file::{FileSource, open_recording};
 use super::read::decode::{LoggedMessage, MessageDecoder};
-use super::read::file_source::{FileSource, check_stop};
-use super::read::limits::SizeLimits;
-use super::read::read_error::{LogEnd, ReadError};
-use super::read::reader::{ChunkStart, LogReader, open_recording};
-use super::read::records::RecordReader;
+use super::read::reader::{ChunkStart, LogReader};
+use super::read::records::parse_inner;
+use super::read_error::{LogEnd, ReadError, check_stop};
 use super::run::RunDescription;
+use super::scanner::chunk::{Chunk, ChunkContent, InnerRecords};
+use super::scanner::limits::{RECORD_HEADER_SIZE_BYTES, SizeLimits};
+use super::scanner::split_header;
 use super::topic::Topic;
-use chunk::LocatedChunk;
-pub(super) use chunk::record_size_bytes;
-pub(super) use summary::summary_start;
+use located::LocatedChunk;
+pub(super) use located::summary_start;
 
 /// A recording with random access to its chunks. Clones read the same file, also on other threads.
 #[derive(Debug, Clone)]
@@ -100,12 +99,12 @@ impl IndexedLog {
         log.selection().require_all_particles("a reader of single steps")?;
         let limits = log.limits();
         let (run, scene) = (log.run().clone(), log.scene().to_vec());
-        let size_bytes = file.metadata()?.len();
-        let summary = summary::read(&file, size_bytes, stop)?;
-        let has_index = summary.is_some();
-        let (located, end) = match summary {
+        let source = || FileSource::new(Arc::clone(&file));
+        let index = located::read_index(source(), stop)?;
+        let has_index = index.is_some();
+        let (located, end) = match index {
             Some(located) => (located, LogEnd::Complete),
-            None => scan::read(&file, size_bytes, stop, on_progress)?,
+            None => located::scan(source(), stop, on_progress)?,
         };
         let channels = BTreeMap::new();
         let (stop, chunks) = (stop.cloned(), Vec::new());
@@ -213,31 +212,34 @@ impl IndexedLog {
             }
             read => read?,
         }
-        if bytes.first() != Some(&op::CHUNK) || record_size_bytes(&bytes) != Some(size_bytes) {
+        let body_size = size_bytes.checked_sub(RECORD_HEADER_SIZE_BYTES as u64);
+        if split_header(&bytes) != Some(op::CHUNK).zip(body_size) {
             return Err(damaged("no chunk starts here".to_owned()));
         }
-        let mut records = RecordReader::without_magic(bytes.as_slice(), self.limits);
         let (channels, run, limits) = (&mut self.channels, &self.run, &self.limits);
+        let chunk = Chunk::new(&bytes[RECORD_HEADER_SIZE_BYTES..], limits).map_err(damaged)?;
+        let mut content = ChunkContent::default();
+        content.read(&chunk).map_err(damaged)?;
         let memory_max = limits.decoded_size_bytes_max();
         let mut memory = 0;
         let mut decoder = MessageDecoder { run, limits, spare: &mut Vec::new() };
         let mut messages = Vec::new();
-        while let Some(message) = records.next(|record, _| match record {
-            Record::Channel(channel) => {
-                channels.insert(channel.id, Topic::from_name(&channel.topic));
-                Ok(None)
-            }
-            Record::Message { header, data } => {
-                let channel = channels.get(&header.channel_id).copied().flatten();
-                let Some(topic) = channel else { return Ok(None) };
-                let (sequence, byte) = (header.sequence, offset + size_bytes);
-                let topic_name = topic.name();
-                let malformed =
-                    |what| ReadError::Malformed { topic: topic_name, sequence, byte, what };
-                decoder.decode(topic, &header, &data).map_err(malformed)
-            }
-            _ => Ok(None),
-        })? {
+        for record in InnerRecords::from(content.of(chunk.data), 0) {
+            let record = record.and_then(|record| parse_inner(&record)).map_err(damaged)?;
+            let (header, data) = match record {
+                Record::Message { header, data } => (header, data),
+                Record::Channel(channel) => {
+                    channels.insert(channel.id, Topic::from_name(&channel.topic));
+                    continue;
+                }
+                _ => continue,
+            };
+            let channel = channels.get(&header.channel_id).copied().flatten();
+            let Some(topic) = channel else { continue };
+            let (sequence, byte) = (header.sequence, offset + size_bytes);
+            let topic_name = topic.name();
+            let malformed = |what| ReadError::Malformed { topic: topic_name, sequence, byte, what };
+            let message = decoder.decode(topic, &header, &data).map_err(malformed)?;
             let Some(message) = message else { continue };
             memory += message.size_bytes();
             if memory > memory_max {
@@ -247,10 +249,6 @@ impl IndexedLog {
             }
             messages.push(message);
         }
-        match records.end {
-            Some(LogEnd::Complete) | None => Ok(messages),
-            Some(LogEnd::Truncated { .. }) => Err(damaged("it ends too early".to_owned())),
-            Some(LogEnd::Damaged { cause, .. }) => Err(damaged(cause)),
-        }
+        Ok(messages)
     }
 }

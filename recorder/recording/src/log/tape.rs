@@ -13,10 +13,9 @@ use std::sync::Arc;
 use sim_contract::{ParticleState, Stop, Torn};
 
 use super::index::IndexedLog;
-use super::read::file_source::FileSource;
+use super::input_file::{FileSource, open_recording};
 use super::read::frames::FrameReader;
-use super::read::read_error::{LogEnd, ReadError};
-use super::read::reader::open_recording;
+use super::read_error::{LogEnd, ReadError};
 use super::rows::{
     CollidersRow, ForcesRow, ParametersRow, StatusRow, StepRow, SurfaceRow, TopologyRow,
 };

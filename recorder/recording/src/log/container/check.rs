@@ -3,25 +3,27 @@
 use std::collections::BTreeSet;
 use std::io::{Read, Seek};
 
-use mcap::records::{Channel, Footer, Header, MessageHeader, Metadata, Record, op};
+use mcap::records::{Channel, Header, MessageHeader, Metadata, Record, op};
 use sim_contract::Stop;
 
-use super::attachment::no_checksum;
-use super::chunk::{Chunk, ChunkContent, InnerRecords};
 use super::content::ContentCheck;
 use super::finding::{CheckExtent, CheckReport, Findings, after_end_text, record_name};
 use super::places::Places;
 use super::summary::{SummaryCheck, is_of_index};
-use super::walk::{Part, Walk};
-use super::window::Window;
-use crate::log::read::limits::{RECORD_HEADER_SIZE_BYTES, SizeLimits};
-use crate::log::read::read_error::{LogEnd, ReadError};
+use crate::log::read_error::{LogEnd, ReadError};
 use crate::log::run::selection::{ContentSelection, SELECTION_METADATA};
 use crate::log::run::{CLOSING_METADATA, Closing, RUN_METADATA, SCENE_ATTACHMENT};
+use crate::log::scanner::chunk::{Chunk, ChunkContent, InnerRecords};
+use crate::log::scanner::limits::{RECORD_HEADER_SIZE_BYTES, SizeLimits};
+use crate::log::scanner::window::Window;
+use crate::log::scanner::{Checksum, LongAttachment, Part, RecordScanner, Section};
 use crate::log::topic::Topic;
 
 /// Bytes between two calls of the progress callback.
 const PROGRESS_PERIOD_BYTES: u64 = 16 << 20;
+
+/// Finding about an attachment with other bytes than its writer wrote.
+pub(super) const WRONG_CHECKSUM: &str = "its checksum is wrong";
 
 /// Most parts of other programs that a report names.
 const NOT_CHECKED_MAX: usize = 16;
@@ -35,30 +37,22 @@ pub fn check_file<R: Read + Seek>(
     stop: Option<&Stop>,
     on_progress: &mut dyn FnMut(u64, u64),
 ) -> Result<CheckReport, ReadError> {
-    let mut walk = Walk::new(Window::new(source, stop.cloned())?)?;
+    let mut scanner = RecordScanner::new(Window::new(source, stop.cloned())?)?;
     let mut check = Check::default();
     let mut chunks = ChunkContent::default();
     let mut next_progress = 0;
     loop {
-        if walk.position() >= next_progress {
-            on_progress(walk.position(), walk.size_bytes());
-            next_progress = walk.position() + PROGRESS_PERIOD_BYTES;
+        if scanner.position() >= next_progress {
+            on_progress(scanner.position(), scanner.size_bytes());
+            next_progress = scanner.position() + PROGRESS_PERIOD_BYTES;
         }
-        let Some(part) = walk.next()? else { break };
-        let section_end = check.add(part, &mut chunks)?;
-        check.end_section(section_end, &mut walk);
+        let Some(part) = scanner.next()? else { break };
+        check.add(part, &mut chunks)?;
         if let Some(limits) = check.new_limits.take() {
-            walk.set_limits(limits);
+            scanner.set_limits(limits);
         }
     }
-    check.finish(walk.size_bytes())
-}
-
-/// A record that ends a section and has its checksum.
-enum SectionEnd {
-    None,
-    Data { byte: u64, saved: u32 },
-    Summary { byte: u64, record: Vec<u8>, saved: u32 },
+    check.finish(scanner.size_bytes())
 }
 
 /// The record of the file that holds a message.
@@ -78,7 +72,7 @@ struct Check {
     selection: ContentSelection,
     content: Option<ContentCheck>,
     first_step: Option<u64>,
-    /// The limits of the scene, until the walk has them.
+    /// The limits of the scene, until the scanner has them.
     new_limits: Option<SizeLimits>,
     closing: Option<Closing>,
     places: Places,
@@ -92,36 +86,54 @@ struct Check {
 
 impl Check {
     /// Checks a part of the file.
-    fn add(&mut self, part: Part<'_>, chunks: &mut ChunkContent) -> Result<SectionEnd, ReadError> {
+    fn add(&mut self, part: Part<'_>, chunks: &mut ChunkContent) -> Result<(), ReadError> {
         match part {
-            Part::Record { byte, opcode, body } => self.add_record(byte, opcode, body, chunks),
-            Part::Skipped { opcode: op::CHUNK, .. } => Err(self.no_run()),
+            Part::Record { byte, opcode, body, section } => {
+                self.end_message_indexes(byte, opcode);
+                self.add_record(byte, opcode, body)?;
+                if let Some(section) = section {
+                    self.end_section(byte, opcode, section);
+                }
+            }
+            Part::Chunk { byte, size_bytes, chunk } => {
+                self.end_message_indexes(byte, op::CHUNK);
+                self.add_chunk(byte, size_bytes, &chunk, chunks);
+            }
+            Part::Skipped { opcode: op::CHUNK, .. } => return Err(self.no_run()),
             Part::Skipped { byte, opcode } => {
                 self.not_checked(format!("the {} at byte {byte}", record_name(opcode)));
-                Ok(SectionEnd::None)
             }
             Part::LongAttachment { attachment, checksum } => {
-                let what = attachment.check(checksum, &mut self.findings, &mut self.places);
-                if let Some(what) = what {
-                    self.not_checked(what);
+                let LongAttachment { byte, size_bytes, header, data } = attachment;
+                if checksum == Checksum::Wrong {
+                    self.findings.add(byte, "attachment", WRONG_CHECKSUM);
                 }
-                Ok(SectionEnd::None)
+                if checksum == Checksum::Missing {
+                    self.not_checked(no_checksum(&header.name));
+                }
+                self.places.add_attachment(byte, size_bytes, &header, data.end - data.start);
             }
             Part::Damaged { bytes, cause } => {
                 let what = format!("{} bytes are damaged: {cause}", bytes.end - bytes.start);
                 self.findings.add(bytes.start, "damaged record", what);
                 self.mark_gap();
                 self.allow_scene(bytes.end - bytes.start);
-                Ok(SectionEnd::None)
             }
             Part::Truncated { byte } => {
                 self.findings.add(byte, "end of the file", "the file is truncated here");
-                Ok(SectionEnd::None)
             }
             Part::AfterEnd { bytes } => {
                 self.findings.add(bytes.start, "end of the file", after_end_text(&bytes));
-                Ok(SectionEnd::None)
             }
+        }
+        Ok(())
+    }
+
+    /// Ends the message indexes of a chunk at the next record of another kind.
+    fn end_message_indexes(&mut self, byte: u64, opcode: u8) {
+        if opcode != op::MESSAGE_INDEX && self.places.end_chunk() {
+            let what = "a message index is missing after the chunk before";
+            self.findings.add_index(byte, "chunk", what);
         }
     }
 
@@ -151,28 +163,14 @@ impl Check {
         }
     }
 
-    fn add_record(
-        &mut self,
-        byte: u64,
-        opcode: u8,
-        body: &[u8],
-        chunks: &mut ChunkContent,
-    ) -> Result<SectionEnd, ReadError> {
-        if opcode != op::MESSAGE_INDEX && self.places.end_chunk() {
-            let what = "a message index is missing after the chunk before";
-            self.findings.add_index(byte, "chunk", what);
-        }
-        if opcode == op::CHUNK {
-            self.add_chunk(byte, body, chunks)?;
-            return Ok(SectionEnd::None);
-        }
+    fn add_record(&mut self, byte: u64, opcode: u8, body: &[u8]) -> Result<(), ReadError> {
         let record = match mcap::parse_record(opcode, body) {
             Ok(record) => record,
             Err(error) => {
                 self.findings.add(byte, record_name(opcode), error.to_string());
                 self.mark_gap();
                 self.allow_scene(body.len() as u64);
-                return Ok(SectionEnd::None);
+                return Ok(());
             }
         };
         let size_bytes = (RECORD_HEADER_SIZE_BYTES + body.len()) as u64;
@@ -185,7 +183,10 @@ impl Check {
         } else {
             self.add_data_record(byte, &record, size_bytes)?;
         }
-        Ok(section_end(byte, &record, body))
+        if opcode == op::DATA_END && self.summary.is_none() {
+            self.summary = Some(SummaryCheck::new(byte + size_bytes));
+        }
+        Ok(())
     }
 
     /// Checks a record before the end of the data.
@@ -273,23 +274,23 @@ impl Check {
     fn add_chunk(
         &mut self,
         byte: u64,
-        body: &[u8],
+        size_bytes: usize,
+        chunk: &Chunk<'_>,
         chunks: &mut ChunkContent,
-    ) -> Result<(), ReadError> {
-        let Some(content) = &self.content else {
-            return Err(self.no_run());
-        };
+    ) {
         self.extent.chunk_count += 1;
-        let limits = *content.limits();
-        match chunks.read(body, &limits)? {
-            Ok(chunk) => self.add_content(byte, body.len(), &chunk),
-            Err(cause) => {
-                self.findings.add(byte, "chunk", cause);
-                self.places.statistics.chunk_count += 1;
-                self.mark_gap();
-            }
+        if let Err(cause) = chunks.read(chunk) {
+            self.findings.add(byte, "chunk", cause);
+            self.places.statistics.chunk_count += 1;
+            self.mark_gap();
+            return;
         }
-        Ok(())
+        let content = chunks.of(chunk.data);
+        self.places.begin_chunk(byte, size_bytes as u64, &chunk.header);
+        if chunk.header.uncompressed_crc == 0 && !content.is_empty() {
+            self.findings.add_index(byte, "chunk", "it has no checksum");
+        }
+        self.add_content(byte, content);
     }
 
     /// Returns the error of a file without a readable description of its run.
@@ -301,23 +302,17 @@ impl Check {
         ReadError::NoHeader(LogEnd::Damaged { byte: first.byte, cause: first.what.clone() })
     }
 
-    fn add_content(&mut self, byte: u64, body_size: usize, chunk: &Chunk<'_>) {
-        let size_bytes = (RECORD_HEADER_SIZE_BYTES + body_size) as u64;
-        self.places.begin_chunk(byte, size_bytes, &chunk.header);
-        if !chunk.has_checksum && !chunk.content.is_empty() {
-            self.findings.add_index(byte, "chunk", "it has no checksum");
-        }
-        for record in InnerRecords::new(chunk.content) {
+    fn add_content(&mut self, byte: u64, content: &[u8]) {
+        for record in InnerRecords::from(content, 0) {
             let result = record.and_then(|inner| {
-                match mcap::parse_record(inner.opcode, inner.body) {
-                    Ok(Record::Schema { header, .. }) => self.add_schema(header.id),
-                    Ok(Record::Channel(channel)) => self.add_channel(&channel)?,
-                    Ok(Record::Message { header, data }) => {
+                match inner.parse()? {
+                    Record::Schema { header, .. } => self.add_schema(header.id),
+                    Record::Channel(channel) => self.add_channel(&channel)?,
+                    Record::Message { header, data } => {
                         let place = InFile { byte, record: "chunk, message" };
                         self.add_message(place, &header, &data, inner.offset);
                     }
-                    Ok(other) => return Err(format!("a {} in it", record_name(other.opcode()))),
-                    Err(error) => return Err(error.to_string()),
+                    other => return Err(format!("a {} in it", record_name(other.opcode()))),
                 }
                 Ok(())
             });
@@ -348,35 +343,20 @@ impl Check {
         }
     }
 
-    /// Compares the checksum of a section.
-    fn end_section<R: Read + Seek>(&mut self, end: SectionEnd, walk: &mut Walk<R>) {
-        let (byte, saved, calculated, section) = match end {
-            SectionEnd::None => return,
-            SectionEnd::Data { byte, saved } => {
-                let calculated = walk.checksum_before();
-                walk.restart_checksum();
-                if self.summary.is_none() {
-                    self.summary = Some(SummaryCheck::new(walk.position()));
-                }
-                (byte, saved, calculated, "data")
-            }
-            SectionEnd::Summary { byte, record, saved } => {
-                (byte, saved, walk.summary_checksum(&record), "index")
-            }
-        };
-        let record = if section == "data" { "end of the data" } else { "footer" };
-        if saved == 0 {
-            self.findings.add_index(byte, record, format!("the {section} has no checksum"));
-        } else if saved != calculated && (section == "index" || !self.has_damage) {
-            self.findings.add_index(
-                byte,
-                record,
-                format!(
-                    "the checksum of the {section} before it is {saved:08x}, but those bytes have \
-                     {calculated:08x}"
-                ),
+    /// Compares the checksum of a section, which a record ends.
+    fn end_section(&mut self, byte: u64, opcode: u8, section: Section) {
+        let is_index = opcode == op::FOOTER;
+        let name = if is_index { "index" } else { "data" };
+        if section.saved == 0 {
+            let what = format!("the {name} has no checksum");
+            self.findings.add_index(byte, record_name(opcode), what);
+        } else if section.is_wrong() && (is_index || !self.has_damage) {
+            let what = format!(
+                "the checksum of the {name} before it is {:08x}, but those bytes have {:08x}",
+                section.saved, section.calculated
             );
-        } else if section == "index" {
+            self.findings.add_index(byte, record_name(opcode), what);
+        } else if is_index {
             self.check_index(byte);
         }
     }
@@ -458,16 +438,7 @@ impl Check {
     }
 }
 
-/// Returns the checksum of the section that a record ends.
-fn section_end(byte: u64, record: &Record<'_>, body: &[u8]) -> SectionEnd {
-    match record {
-        Record::DataEnd(end) => SectionEnd::Data { byte, saved: end.data_section_crc },
-        Record::Footer(Footer { summary_crc, .. }) => {
-            let header = [&[op::FOOTER][..], &(body.len() as u64).to_le_bytes()].concat();
-            let checked = &body[..body.len() - size_of::<u32>()];
-            let record = [&header, checked].concat();
-            SectionEnd::Summary { byte, record, saved: *summary_crc }
-        }
-        _ => SectionEnd::None,
-    }
+/// Returns the description of an attachment that cannot be checked.
+fn no_checksum(name: &str) -> String {
+    format!("the attachment '{name}', which has no checksum")
 }

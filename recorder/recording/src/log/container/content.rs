@@ -11,12 +11,12 @@ use crate::log::encoding::particle_bytes;
 use crate::log::message::{Message, StepOrder};
 use crate::log::read::decode::MessageDecoder;
 use crate::log::read::gaps::GapCounter;
-use crate::log::read::limits::SizeLimits;
-use crate::log::read::read_error::ReadError;
 use crate::log::read::reader::read_run;
+use crate::log::read_error::ReadError;
 use crate::log::rows::{ForcesRow, StepRow, TearsRow};
 use crate::log::run::RunDescription;
 use crate::log::run::selection::ContentSelection;
+use crate::log::scanner::limits::SizeLimits;
 use crate::log::state_hash::hash_bytes;
 use crate::log::topic::{AllCounts, Topic};
 
@@ -29,7 +29,7 @@ const EXPONENT: u32 = 0x7f80_0000;
 
 /// A message that passed its checks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Sound {
+pub(super) enum Validity {
     /// A message of another program, or `/tf`.
     Other,
     /// The header of a snapshot, whose payload must follow.
@@ -166,22 +166,26 @@ impl ContentCheck {
     }
 
     /// Checks a message. `Err` describes its fault; then it has no effect on later checks.
-    pub(super) fn check(&mut self, header: &MessageHeader, data: &[u8]) -> Result<Sound, String> {
+    pub(super) fn check(
+        &mut self,
+        header: &MessageHeader,
+        data: &[u8],
+    ) -> Result<Validity, String> {
         let channel_id = header.channel_id;
         if !self.is_declared(channel_id) {
             return Err(format!("its channel {channel_id} is not declared before it"));
         }
-        let Some(topic) = self.topic(channel_id) else { return Ok(Sound::Other) };
+        let Some(topic) = self.topic(channel_id) else { return Ok(Validity::Other) };
         if header.log_time < self.log_time_ns {
             return Err("its log_time is earlier than that of the message before it".to_owned());
         }
-        let sound = match topic {
+        let message = match topic {
             Topic::Particles => self.check_particles(header, data)?,
             _ => self.check_decoded(topic, header, data)?,
         };
         self.log_time_ns = header.log_time;
         self.counts[topic].written += 1;
-        Ok(sound)
+        Ok(message)
     }
 
     fn check_decoded(
@@ -189,11 +193,11 @@ impl ContentCheck {
         topic: Topic,
         header: &MessageHeader,
         data: &[u8],
-    ) -> Result<Sound, String> {
+    ) -> Result<Validity, String> {
         let mut decoder =
             MessageDecoder { run: &self.run, limits: &self.limits, spare: &mut Vec::new() };
         let logged = decoder.decode(topic, header, data)?;
-        let Some(logged) = logged else { return Ok(Sound::Other) };
+        let Some(logged) = logged else { return Ok(Validity::Other) };
         let message = logged.message;
         self.check_time(header, message.step())?;
         match &message {
@@ -212,15 +216,15 @@ impl ContentCheck {
         match message {
             Message::Step(row) if self.needs_payload() => {
                 self.row = Some(row);
-                Ok(Sound::Row)
+                Ok(Validity::Row)
             }
             Message::Step(row) => {
                 // A recording of commands has the payloads of some.
                 self.row = self.selection.is_only_commands.then_some(row);
                 self.last_row = Some(row);
-                Ok(Sound::Update(Topic::Steps))
+                Ok(Validity::Update(Topic::Steps))
             }
-            _ => Ok(Sound::Update(topic)),
+            _ => Ok(Validity::Update(topic)),
         }
     }
 
@@ -299,7 +303,7 @@ impl ContentCheck {
         Ok(())
     }
 
-    fn check_particles(&mut self, header: &MessageHeader, data: &[u8]) -> Result<Sound, String> {
+    fn check_particles(&mut self, header: &MessageHeader, data: &[u8]) -> Result<Validity, String> {
         let row = self.row.take();
         let limit = self.limits.message_size_bytes_max(Topic::Particles);
         if data.len() as u64 > limit {
@@ -334,7 +338,7 @@ impl ContentCheck {
             None => self.unhashed_count += 1,
         }
         self.last_row = Some(row);
-        Ok(Sound::Payload)
+        Ok(Validity::Payload)
     }
 }
 

@@ -1,36 +1,35 @@
 //! The repair of a file: everything that is intact, with a new index and all losses declared.
 //!
-//! The walk goes on behind damage, chunks count only with a correct checksum, and messages only if they
+//! The scanner goes on behind damage, chunks count only with a correct checksum, and messages only if they
 //! pass the checks of `recorder check`. A snapshot is kept with its row or not at all. So the result is
 //! sound, and says what it lacks: message counts in the metadata `recorder`, and ranges of steps in the
 //! metadata `repair`.
 
-mod long_attachment;
 mod message_index;
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
-use std::io::{Read, Seek, Write};
+use std::io::{ErrorKind, Read, Seek, Write};
+use std::ops::Range;
 
 use mcap::records::{Metadata, Record, op};
 use mcap::{Attachment, MAGIC};
 use sim_contract::Stop;
 
-use super::chunk::{ChunkContent, InnerRecords, compression};
+use super::check::WRONG_CHECKSUM;
 use super::content::ContentCheck;
 use super::finding::{AfterEnd, Findings, RepairReport, record_name};
 use super::losses::{LOST_SCENE, LOST_SELECTION};
 use super::lost_load::LoadRows;
 use super::places::Places;
-use super::salvage::{Format, Salvage, size_in_memory};
-use super::walk::{Part, Walk};
-use super::window::Window;
-use crate::log::read::limits::{
-    HEADER_RECORD_SIZE_BYTES_MAX, RECORD_HEADER_SIZE_BYTES, SizeLimits,
-};
-use crate::log::read::read_error::{LogEnd, ReadError};
+use super::repair_writer::{Format, RepairWriter, size_in_memory};
+use crate::log::read_error::{LogEnd, ReadError};
 use crate::log::run::selection::{ContentSelection, SELECTION_METADATA};
 use crate::log::run::{CLOSING_METADATA, Closing, RUN_METADATA, SCENE_ATTACHMENT, header_library};
+use crate::log::scanner::chunk::{Chunk, ChunkContent, InnerRecords};
+use crate::log::scanner::limits::{HEADER_RECORD_SIZE_BYTES_MAX, SizeLimits};
+use crate::log::scanner::window::Window;
+use crate::log::scanner::{Checksum, LongAttachment, Part, RecordScanner};
 use crate::log::writer::WriteError;
 
 /// Bytes between two calls of the progress callback.
@@ -62,34 +61,60 @@ pub fn repair_file<R: Read + Seek, W: Write>(
     stop: Option<&Stop>,
     on_progress: &mut dyn FnMut(u64, u64),
 ) -> Result<RepairReport, RepairError> {
-    let mut walk = Walk::new(Window::new(source, stop.cloned())?)?;
-    let mut repair = Repair { load, ..Repair::new(walk.size_bytes(), out) };
+    let mut scanner = RecordScanner::new(Window::new(source, stop.cloned())?)?;
+    let mut repair = Repair { load, ..Repair::new(scanner.size_bytes(), out) };
     let mut chunks = ChunkContent::default();
     let mut next_progress = 0;
     loop {
-        if walk.position() >= next_progress {
-            on_progress(walk.position(), walk.size_bytes());
-            next_progress = walk.position() + PROGRESS_PERIOD_BYTES;
+        if scanner.position() >= next_progress {
+            on_progress(scanner.position(), scanner.size_bytes());
+            next_progress = scanner.position() + PROGRESS_PERIOD_BYTES;
         }
-        let Some(part) = walk.next()? else { break };
-        if let Part::LongAttachment { attachment, checksum } = part {
-            repair.add_long_attachment(&mut walk, attachment, checksum)?;
-            continue;
-        }
-        if let Part::AfterEnd { bytes } = part {
-            repair.after_end = Some(walk.read_after_end(&bytes)?);
-            continue;
-        }
-        if let Some(saved) = repair.add(part, &mut chunks)? {
-            repair.has_wrong_checksum = saved != 0 && saved != walk.checksum_before();
-            repair.is_unexplained = repair.has_wrong_checksum && repair.findings.count() == 0;
-            walk.restart_checksum();
+        match scanner.next()? {
+            None => break,
+            Some(Part::LongAttachment { attachment, checksum }) => {
+                repair.add_long_attachment(&mut scanner, attachment, checksum)?;
+            }
+            Some(Part::AfterEnd { bytes }) => {
+                repair.after_end = Some(read_after_end(&mut scanner, &bytes)?);
+            }
+            Some(part) => repair.add(part, &mut chunks)?,
         }
         if let Some(limits) = repair.new_limits.take() {
-            walk.set_limits(limits);
+            scanner.set_limits(limits);
         }
     }
     repair.finish()
+}
+
+/// Reads the bytes after the end to count their messages.
+fn read_after_end<R: Read>(
+    scanner: &mut RecordScanner<R>,
+    bytes: &Range<u64>,
+) -> Result<AfterEnd, ReadError> {
+    let (byte, size_bytes) = (bytes.start, bytes.end - bytes.start);
+    let mut found = AfterEnd { byte, size_bytes, ..AfterEnd::default() };
+    let mut begin = Some(byte);
+    while let Some(at) = begin.take() {
+        scanner.go_to(at);
+        while let Some(part) = scanner.next()? {
+            match part {
+                Part::Chunk { .. } => found.chunk_count += 1,
+                Part::Record { opcode: op::MESSAGE, .. } => found.message_count += 1,
+                Part::Record { opcode: op::MESSAGE_INDEX, body, .. } => {
+                    if let Ok(Record::MessageIndex(index)) =
+                        mcap::parse_record(op::MESSAGE_INDEX, body)
+                    {
+                        found.message_count += index.records.len() as u64;
+                    }
+                }
+                // A third file.
+                Part::AfterEnd { bytes } => begin = Some(bytes.start),
+                _ => {}
+            }
+        }
+    }
+    Ok(found)
 }
 
 /// The section of the input that is read.
@@ -130,7 +155,7 @@ struct Repair<W: Write> {
     is_head_damaged: bool,
     /// The output, until it is created.
     out: Option<W>,
-    salvage: Option<Salvage<W>>,
+    writer: Option<RepairWriter<W>>,
     closing: Option<Closing>,
     section: Section,
     has_wrong_checksum: bool,
@@ -159,7 +184,7 @@ impl<W: Write> Repair<W> {
             head_size_bytes: 0,
             is_head_damaged: false,
             out: Some(out),
-            salvage: None,
+            writer: None,
             closing: None,
             section: Section::Data,
             has_wrong_checksum: false,
@@ -169,22 +194,27 @@ impl<W: Write> Repair<W> {
         }
     }
 
-    /// Adds a part of the input. Returns the checksum of the data at their end.
-    fn add(
-        &mut self,
-        part: Part<'_>,
-        chunks: &mut ChunkContent,
-    ) -> Result<Option<u32>, RepairError> {
+    /// Adds a part of the input.
+    fn add(&mut self, part: Part<'_>, chunks: &mut ChunkContent) -> Result<(), RepairError> {
         match part {
-            Part::Record { byte, opcode, body } => self.add_record(byte, opcode, body, chunks),
-            Part::Skipped { opcode: op::CHUNK, .. } => Err(self.no_run().into()),
-            // The one is copied in pieces from the walk, the other is only counted.
-            Part::LongAttachment { .. } | Part::AfterEnd { .. } => Ok(None),
+            Part::Record { byte, opcode, body, section } => {
+                self.add_record(byte, opcode, body)?;
+                if let Some(section) = section.filter(|_| opcode == op::DATA_END) {
+                    self.has_wrong_checksum = section.is_wrong();
+                    self.is_unexplained = section.is_wrong() && self.findings.count() == 0;
+                }
+            }
+            Part::Chunk { .. } if self.section == Section::Index => {}
+            Part::Chunk { byte, size_bytes, chunk } => {
+                self.add_chunk(byte, size_bytes, &chunk, chunks)?;
+            }
+            Part::Skipped { opcode: op::CHUNK, .. } => return Err(self.no_run().into()),
+            // The attachment is copied in pieces, the bytes are only counted.
+            Part::LongAttachment { .. } | Part::AfterEnd { .. } => {}
             Part::Skipped { byte, opcode } => {
                 self.lose(byte, record_name(opcode), "it is of another program")?;
                 // The opcode may be the damage.
                 self.begin_damage();
-                Ok(None)
             }
             Part::Damaged { bytes, cause } => {
                 let size_bytes = bytes.end - bytes.start;
@@ -192,18 +222,16 @@ impl<W: Write> Repair<W> {
                 self.allow_scene(size_bytes);
                 self.lose(bytes.start, "damaged record", &what)?;
                 self.begin_damage();
-                Ok(None)
             }
             // A killed recorder leaves whole records.
             Part::Truncated { byte } if byte == self.size_bytes => {
                 self.findings.add_index(byte, "end of the file", "the file has no end");
-                Ok(None)
             }
             Part::Truncated { byte } => {
                 self.lose(byte, "end of the file", "the file is truncated here")?;
-                Ok(None)
             }
         }
+        Ok(())
     }
 
     /// The message indexes of an unreadable chunk may follow.
@@ -231,44 +259,29 @@ impl<W: Write> Repair<W> {
         if self.content.is_some() {
             self.begin()?;
         }
-        match (&mut self.salvage, &mut self.content) {
-            (Some(salvage), Some(content)) => salvage.mark_gap(content),
+        match (&mut self.writer, &mut self.content) {
+            (Some(writer), Some(content)) => writer.mark_gap(content),
             _ => self.is_head_damaged = true,
         }
         Ok(())
     }
 
-    fn add_record(
-        &mut self,
-        byte: u64,
-        opcode: u8,
-        body: &[u8],
-        chunks: &mut ChunkContent,
-    ) -> Result<Option<u32>, RepairError> {
+    fn add_record(&mut self, byte: u64, opcode: u8, body: &[u8]) -> Result<(), RepairError> {
         if self.section == Section::Index {
             if let Ok(Record::Statistics(statistics)) = mcap::parse_record(opcode, body) {
                 self.indexed = Some(statistics.channel_message_counts);
             }
-            return Ok(None);
-        }
-        if opcode == op::CHUNK {
-            self.add_chunk(byte, body, chunks)?;
-            return Ok(None);
+            return Ok(());
         }
         let record = match mcap::parse_record(opcode, body) {
             Ok(record) => record,
             Err(error) => {
                 self.allow_scene(body.len() as u64);
-                self.lose(byte, record_name(opcode), &error.to_string())?;
-                return Ok(None);
+                return self.lose(byte, record_name(opcode), &error.to_string());
             }
         };
         match record {
-            Record::DataEnd(end) => {
-                self.section = Section::Index;
-                return Ok(Some(end.data_section_crc));
-            }
-            Record::Footer(_) => self.section = Section::Index,
+            Record::DataEnd(_) | Record::Footer(_) => self.section = Section::Index,
             Record::Header(header) => self.format.library = header.library,
             Record::MessageIndex(index) => self.add_message_index(byte, &index)?,
             Record::Metadata(metadata) => self.add_metadata(byte, metadata)?,
@@ -282,7 +295,7 @@ impl<W: Write> Repair<W> {
             }
             other => self.add_content_record(byte, "record", &other)?,
         }
-        Ok(None)
+        Ok(())
     }
 
     fn add_metadata(&mut self, byte: u64, metadata: Metadata) -> Result<(), RepairError> {
@@ -305,7 +318,7 @@ impl<W: Write> Repair<W> {
     /// Copies an attachment or a metadata record. Those before the first chunk wait for its compression,
     /// as long as they need little memory.
     fn add_head(&mut self, byte: u64, record: Record<'static>) -> Result<(), RepairError> {
-        if self.salvage.is_some() {
+        if self.writer.is_some() {
             return Ok(self.copy_head(&record)?);
         }
         let sum = self.head_size_bytes.saturating_add(size_in_memory(&record));
@@ -322,16 +335,16 @@ impl<W: Write> Repair<W> {
     }
 
     fn copy_head(&mut self, record: &Record<'static>) -> Result<(), WriteError> {
-        let Some(salvage) = &mut self.salvage else { return Ok(()) };
+        let Some(writer) = &mut self.writer else { return Ok(()) };
         match record {
-            Record::Attachment { header, data, .. } => salvage.attach(&Attachment {
+            Record::Attachment { header, data, .. } => writer.attach(&Attachment {
                 log_time: header.log_time,
                 create_time: header.create_time,
                 name: header.name.clone(),
                 media_type: header.media_type.clone(),
                 data: Cow::Borrowed(data),
             }),
-            Record::Metadata(metadata) => salvage.write_metadata(metadata),
+            Record::Metadata(metadata) => writer.write_metadata(metadata),
             _ => Ok(()),
         }
     }
@@ -340,11 +353,11 @@ impl<W: Write> Repair<W> {
     fn begin(&mut self) -> Result<(), RepairError> {
         let Some(out) = self.out.take() else { return Ok(()) };
         self.restore_header();
-        let salvage = self.salvage.insert(Salvage::create(out, &self.format)?);
+        let writer = self.writer.insert(RepairWriter::create(out, &self.format)?);
         if self.is_head_damaged {
             let is_scene = |one: &Record<'_>| matches!(one, Record::Attachment { header, .. } if header.name == SCENE_ATTACHMENT);
             let what = if self.head.iter().any(is_scene) { LOST_SELECTION } else { LOST_SCENE };
-            salvage.losses.lose_head(what);
+            writer.losses.lose_head(what);
         }
         for record in std::mem::take(&mut self.head) {
             self.copy_head(&record)?;
@@ -367,34 +380,23 @@ impl<W: Write> Repair<W> {
     fn add_chunk(
         &mut self,
         byte: u64,
-        body: &[u8],
+        size_bytes: usize,
+        chunk: &Chunk<'_>,
         chunks: &mut ChunkContent,
     ) -> Result<(), RepairError> {
-        let Some(content) = &self.content else { return Err(self.no_run().into()) };
-        let limits = *content.limits();
-        let chunk = chunks.read(body, &limits)?;
-        if self.salvage.is_none()
-            && let Some(compression) = compression(body)
-        {
-            self.format.compression = Some(compression);
+        if self.writer.is_none() {
+            self.format.compression = Some(chunk.header.compression.clone());
         }
         self.begin()?;
-        self.section = if chunk.is_ok() { Section::Data } else { Section::AfterBadChunk };
-        let chunk = match chunk {
-            Ok(chunk) => chunk,
-            Err(cause) => {
-                self.declare_channels()?;
-                return self.lose(byte, "chunk", &cause);
-            }
-        };
-        let size_bytes = (RECORD_HEADER_SIZE_BYTES + body.len()) as u64;
-        self.places.begin_chunk(byte, size_bytes, &chunk.header);
-        for inner in InnerRecords::new(chunk.content) {
-            let record = inner.and_then(|inner| {
-                let record = mcap::parse_record(inner.opcode, inner.body);
-                record.map(|record| (record, inner.offset)).map_err(|error| error.to_string())
-            });
-            match record {
+        if let Err(cause) = chunks.read(chunk) {
+            self.section = Section::AfterBadChunk;
+            self.declare_channels()?;
+            return self.lose(byte, "chunk", &cause);
+        }
+        self.section = Section::Data;
+        self.places.begin_chunk(byte, size_bytes as u64, &chunk.header);
+        for inner in InnerRecords::from(chunks.of(chunk.data), 0) {
+            match inner.and_then(|inner| inner.parse().map(|record| (record, inner.offset))) {
                 Ok((record, offset)) => {
                     if let Record::Message { header, .. } = &record {
                         self.places.add_message(header, offset);
@@ -405,6 +407,39 @@ impl<W: Write> Repair<W> {
             }
         }
         Ok(())
+    }
+
+    /// Copies a long attachment in pieces. No message is missing without it.
+    fn add_long_attachment<R: Read>(
+        &mut self,
+        scanner: &mut RecordScanner<R>,
+        attachment: LongAttachment,
+        checksum: Checksum,
+    ) -> Result<(), RepairError> {
+        let LongAttachment { byte, header, data, .. } = attachment;
+        if self.content.is_none() {
+            let what = "it is too long to stand before the metadata 'run'";
+            return self.lose(byte, "attachment", what);
+        }
+        self.begin()?;
+        let Some(writer) = &mut self.writer else { return Ok(()) };
+        if checksum == Checksum::Wrong {
+            self.findings.add(byte, "attachment", WRONG_CHECKSUM);
+            writer.losses.add_attachment();
+            return Ok(());
+        }
+        writer.start_attachment(data.end - data.start, header)?;
+        let mut at = data.start;
+        while at < data.end {
+            let block = scanner.block(at..data.end)?;
+            if block.is_empty() {
+                // The file became shorter while it was read.
+                return Err(ReadError::Io(ErrorKind::UnexpectedEof.into()).into());
+            }
+            writer.put_attachment_bytes(block)?;
+            at += block.len() as u64;
+        }
+        Ok(writer.finish_attachment()?)
     }
 
     /// Copies a schema, a channel or a message.
@@ -421,18 +456,18 @@ impl<W: Write> Repair<W> {
         if matches!(record, Record::Message { .. }) {
             self.declare_lost_channels()?;
         }
-        let (Some(salvage), Some(content)) = (&mut self.salvage, &mut self.content) else {
+        let (Some(writer), Some(content)) = (&mut self.writer, &mut self.content) else {
             return Ok(());
         };
         let result = match record {
-            Record::Schema { header, data } => salvage.add_schema(header, data)?,
-            Record::Channel(channel) => match salvage.add_channel(channel)? {
+            Record::Schema { header, data } => writer.add_schema(header, data)?,
+            Record::Channel(channel) => match writer.add_channel(channel)? {
                 Ok(()) => content.add_channel(channel),
                 conflict => conflict,
             },
             Record::Message { header, data } => {
-                let result = salvage.add_message(header, data, content)?;
-                if let Some(step) = salvage.take_dropped_row() {
+                let result = writer.add_message(header, data, content)?;
+                if let Some(step) = writer.take_dropped_row() {
                     let what = format!("step {step}: its snapshot is missing");
                     self.findings.add(byte, place, what);
                 }
@@ -466,7 +501,7 @@ impl<W: Write> Repair<W> {
             self.declare_lost_channels()?;
         }
         let closing = self.closing.take().map(|closing| self.without_damage(closing));
-        let (Some(salvage), Some(mut content)) = (self.salvage.take(), self.content.take()) else {
+        let (Some(writer), Some(mut content)) = (self.writer.take(), self.content.take()) else {
             return Err(WriteError::Stopped.into());
         };
         let mut metadata = BTreeMap::from([
@@ -475,7 +510,7 @@ impl<W: Write> Repair<W> {
             ("finding_count".to_owned(), self.findings.count().to_string()),
         ]);
         let has_end = closing.is_some();
-        let (_, losses) = salvage.finish(closing, &mut content, &mut metadata)?;
+        let (_, losses) = writer.finish(closing, &mut content, &mut metadata)?;
         let last = content.last_row().map(|row| row.step);
         Ok(RepairReport {
             is_uncertain: self.is_unexplained && losses.is_empty(),

@@ -4,10 +4,10 @@ use mcap::records::MessageHeader;
 use serde::de::DeserializeOwned;
 use sim_contract::ParticleState;
 
-use super::limits::SizeLimits;
 use crate::log::encoding::{decode_keyframe, decode_particles};
 use crate::log::message::Message;
 use crate::log::run::RunDescription;
+use crate::log::scanner::limits::SizeLimits;
 use crate::log::topic::Topic;
 
 /// A message with its times in the file.

@@ -5,11 +5,11 @@ use std::io::Read;
 use sim_contract::ParticleState;
 
 use super::decode::LoggedMessage;
-use super::file_source::FileSource;
-use super::read_error::{LogEnd, ReadError};
 use super::reader::{ChunkStart, LogReader};
 use crate::log::backlog::Backlog;
+use crate::log::input_file::FileSource;
 use crate::log::message::{Message, StepOrder};
+use crate::log::read_error::{LogEnd, ReadError};
 use crate::log::rows::StepRow;
 use crate::log::topic::Topic;
 

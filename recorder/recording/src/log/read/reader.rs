@@ -2,24 +2,24 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{self, Read};
+use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
 
 use mcap::records::{MessageHeader, Record, op};
-use sim_contract::{ParticleState, Stop, part_path};
+use sim_contract::{ParticleState, Stop};
 
 use super::decode::{LoggedMessage, MessageDecoder};
-use super::file_source::FileSource;
-use super::limits::SizeLimits;
-use super::open::open_regular_file;
-use super::read_error::{LogEnd, ReadError};
 use super::records::RecordReader;
+use crate::log::input_file::{FileSource, open_recording};
+use crate::log::read_error::{LogEnd, ReadError};
 use crate::log::run::selection::{ContentSelection, SELECTION_METADATA};
 use crate::log::run::{
     CLOSING_METADATA, Closing, FORMAT_VERSION, FORMAT_VERSION_KEY, RUN_METADATA, RunDescription,
     SCENE_ATTACHMENT,
 };
+use crate::log::scanner::limits::SizeLimits;
+use crate::log::scanner::window::Window;
 use crate::log::topic::Topic;
 
 /// Reads one recording from its start.
@@ -61,7 +61,14 @@ impl LogReader<FileSource> {
     /// # Errors
     /// Like [`LogReader::open_until`].
     pub fn of_file(file: Arc<File>, stop: Option<&Stop>) -> Result<Self, ReadError> {
-        Self::new(FileSource::new(file, stop.cloned()))
+        Self::of_window(Window::growing(FileSource::new(file), stop.cloned()))
+    }
+
+    /// Continues at a chunk.
+    pub(in crate::log) fn go_to(&mut self, chunk: &ChunkStart<'_>) {
+        self.records.go_to(chunk.byte);
+        self.channels.extend(chunk.channels);
+        self.closing = None;
     }
 }
 
@@ -74,41 +81,17 @@ pub(in crate::log) struct ChunkStart<'a> {
     pub(in crate::log) channels: &'a BTreeMap<u16, Option<Topic>>,
 }
 
-impl LogReader<FileSource> {
-    /// Continues at a chunk.
-    pub(in crate::log) fn go_to(&mut self, chunk: &ChunkStart<'_>) {
-        self.records.go_to(chunk.byte);
-        self.channels.extend(chunk.channels);
-        self.closing = None;
-    }
-}
-
-/// Opens a recording for readers that share the file, so that all of them read the same one, also if another file
-/// gets its name.
-///
-/// # Errors
-/// If the path is not a regular file or the operating system reports an error.
-pub fn open_recording(path: &Path) -> Result<File, ReadError> {
-    open_regular_file(path).map_err(|cause| open_error(path, cause))
-}
-
-/// Names the unfinished part of a recording that does not exist yet.
-fn open_error(path: &Path, cause: io::Error) -> ReadError {
-    let part = part_path(path);
-    if cause.kind() == io::ErrorKind::NotFound && part.exists() {
-        ReadError::Unfinished { part }
-    } else {
-        cause.into()
-    }
-}
-
 impl<R: Read> LogReader<R> {
     /// Reads the header of a recording.
     ///
     /// # Errors
     /// If the source is not a recording or has no readable header.
     pub fn new(source: R) -> Result<Self, ReadError> {
-        let mut records = RecordReader::new(source);
+        Self::of_window(Window::in_order(source))
+    }
+
+    fn of_window(window: Window<R>) -> Result<Self, ReadError> {
+        let mut records = RecordReader::new(window)?;
         let mut library = String::new();
         let mut scene = None;
         let mut selection = ContentSelection::default();
@@ -141,9 +124,7 @@ impl<R: Read> LogReader<R> {
                 None => {
                     return Err(match records.end {
                         Some(LogEnd::Complete) | None => ReadError::Foreign { library },
-                        Some(end) if records.is_mcap => ReadError::NoHeader(end),
-                        Some(_) if records.is_empty() => ReadError::Empty,
-                        Some(_) => ReadError::NotMcap,
+                        Some(end) => ReadError::NoHeader(end),
                     });
                 }
             }

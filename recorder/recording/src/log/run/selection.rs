@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::num::NonZeroU32;
 
-use crate::log::read::read_error::ReadError;
+use crate::log::read_error::ReadError;
 use crate::log::topic::Topic;
 
 /// Name of the metadata record of [`ContentSelection`].

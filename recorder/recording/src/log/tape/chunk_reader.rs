@@ -9,7 +9,7 @@ use super::chunks::{Chunks, Span};
 use super::digest::{Digest, DigestCache};
 use crate::log::index::IndexedLog;
 use crate::log::message::Message;
-use crate::log::read::read_error::ReadError;
+use crate::log::read_error::ReadError;
 use crate::log::rows::ForcesRow;
 use crate::log::topic::Topic;
 

@@ -2,7 +2,7 @@
 
 use crate::log::index::IndexedLog;
 use crate::log::message::Message;
-use crate::log::read::read_error::ReadError;
+use crate::log::read_error::ReadError;
 use crate::log::rows::{SurfaceRow, TopologyRow};
 use crate::log::topic::Topic;
 

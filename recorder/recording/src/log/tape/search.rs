@@ -2,7 +2,7 @@
 
 use super::chunk_reader::ChunkReader;
 use super::chunks::Span;
-use crate::log::read::read_error::ReadError;
+use crate::log::read_error::ReadError;
 use crate::log::topic::Topic;
 
 /// The first and the last recorded step.

@@ -1,16 +1,20 @@
 //! Replaces the id of the run in a complete recording, for a run whose id follows from all of its commands.
 
-use std::fs::{File, OpenOptions};
+use std::fs::OpenOptions;
 use std::io::{self, ErrorKind};
 use std::os::unix::fs::FileExt;
 use std::path::Path;
+use std::sync::Arc;
 
-use mcap::MAGIC;
 use mcap::records::{Record, op};
 
-use crate::log::index::{record_size_bytes, summary_start};
-use crate::log::read::limits::RECORD_HEADER_SIZE_BYTES;
+use crate::log::index::summary_start;
+use crate::log::input_file::FileSource;
+use crate::log::read_error::ReadError;
 use crate::log::run::RUN_METADATA;
+use crate::log::scanner::limits::RECORD_HEADER_SIZE_BYTES;
+use crate::log::scanner::window::Window;
+use crate::log::scanner::{Part, RecordScanner};
 
 /// Replaces the id, which has as many digits as before, and the checksum that covers it.
 ///
@@ -20,10 +24,11 @@ pub(crate) fn replace_run_id(path: &Path, old: u64, new: u64) -> io::Result<()> 
     if old == new {
         return Ok(());
     }
-    let file = OpenOptions::new().read(true).write(true).open(path)?;
+    let file = Arc::new(OpenOptions::new().read(true).write(true).open(path)?);
     let [old, new] = [old, new].map(|id| format!("{id:016x}").into_bytes());
-    let id_at = find_run_id(&file, &old)?;
-    let summary = summary_start(&file, file.metadata()?.len())?.ok_or(ErrorKind::InvalidData)?;
+    let mut window = Window::new(FileSource::new(Arc::clone(&file)), None)?;
+    let summary = summary_start(&mut window)?.ok_or(ErrorKind::InvalidData)?;
+    let id_at = find_run_id(window, &old)?.ok_or(ErrorKind::InvalidData)?;
     // The record before the index is the end of the data, with the checksum of all bytes before it.
     let mut checksum = [0; size_of::<u32>()];
     let checksum_at = summary - checksum.len() as u64;
@@ -34,29 +39,22 @@ pub(crate) fn replace_run_id(path: &Path, old: u64, new: u64) -> io::Result<()> 
     file.write_all_at(&(u32::from_le_bytes(checksum) ^ change).to_le_bytes(), checksum_at)
 }
 
-/// Returns the position of the id in the metadata of the run.
-fn find_run_id(file: &File, id: &[u8]) -> io::Result<u64> {
-    let mut start = MAGIC.len() as u64;
-    loop {
-        let mut record = vec![0; RECORD_HEADER_SIZE_BYTES];
-        file.read_exact_at(&mut record, start)?;
-        let size_bytes = record_size_bytes(&record).ok_or(ErrorKind::InvalidData)?;
-        if record[0] == op::METADATA {
-            record.resize(usize::try_from(size_bytes).unwrap_or(usize::MAX), 0);
-            file.read_exact_at(&mut record, start)?;
-            let body = &record[RECORD_HEADER_SIZE_BYTES..];
-            if let Ok(Record::Metadata(metadata)) = mcap::parse_record(op::METADATA, body)
-                && metadata.name == RUN_METADATA
-            {
-                // The length of the value precedes it.
-                let entry = [b"run_id", &[16, 0, 0, 0][..], id].concat();
-                let place = record.windows(entry.len()).position(|window| window == entry);
-                let place = place.ok_or(ErrorKind::InvalidData)?;
-                return Ok(start + (place + entry.len() - id.len()) as u64);
-            }
+/// Returns the position of the id in the metadata of the run, which precede the first chunk.
+fn find_run_id(window: Window<FileSource>, id: &[u8]) -> Result<Option<u64>, ReadError> {
+    let mut scanner = RecordScanner::new(window)?.stopping_at_damage();
+    // The length of the value precedes it.
+    let entry = [b"run_id", &[16, 0, 0, 0][..], id].concat();
+    while let Some(part) = scanner.next()? {
+        if let Part::Record { byte, opcode: op::METADATA, body, .. } = part
+            && let Ok(Record::Metadata(metadata)) = mcap::parse_record(op::METADATA, body)
+            && metadata.name == RUN_METADATA
+        {
+            let place = body.windows(entry.len()).position(|window| window == entry);
+            let body_at = byte + RECORD_HEADER_SIZE_BYTES as u64;
+            return Ok(place.map(|place| body_at + (place + entry.len() - id.len()) as u64));
         }
-        start += size_bytes;
     }
+    Ok(None)
 }
 
 /// Returns the change of a checksum after which `after` bytes follow. CRC-32 is linear: the change is that of the

@@ -36,9 +36,9 @@ impl<W: Write> Repair<W> {
         if self.content.is_some() {
             self.begin()?;
         }
-        match (&mut self.salvage, &self.content) {
-            (Some(salvage), Some(content)) if content.has_channels() => {
-                salvage.losses.add_indexed(content.topic(channel_id), count);
+        match (&mut self.writer, &self.content) {
+            (Some(writer), Some(content)) if content.has_channels() => {
+                writer.losses.add_indexed(content.topic(channel_id), count);
             }
             _ => *self.undeclared.entry(channel_id).or_default() += count,
         }
@@ -49,25 +49,25 @@ impl<W: Write> Repair<W> {
     /// of what it had.
     pub(super) fn declare_lost_channels(&mut self) -> Result<(), WriteError> {
         self.declare_channels()?;
-        let (Some(salvage), Some(content)) = (&mut self.salvage, &self.content) else {
+        let (Some(writer), Some(content)) = (&mut self.writer, &self.content) else {
             return Ok(());
         };
         for (channel_id, count) in std::mem::take(&mut self.undeclared) {
-            salvage.losses.add_indexed(content.topic(channel_id), count);
+            writer.losses.add_indexed(content.topic(channel_id), count);
         }
         Ok(())
     }
 
     /// Declares the channels as a recorder does, if none is declared.
     pub(super) fn declare_channels(&mut self) -> Result<(), WriteError> {
-        let (Some(salvage), Some(content)) = (&mut self.salvage, &mut self.content) else {
+        let (Some(writer), Some(content)) = (&mut self.writer, &mut self.content) else {
             return Ok(());
         };
         if content.has_channels() {
             return Ok(());
         }
-        salvage.mark_gap(content);
-        salvage.declare_channels(content, self.load.take())
+        writer.mark_gap(content);
+        writer.declare_channels(content, self.load.take())
     }
 
     /// Removes the numbers of written messages that the index of the file contradicts, if a byte of the data is

@@ -7,7 +7,7 @@ use mcap::records::{AttachmentHeader, Channel, MessageHeader, Metadata, Record, 
 use mcap::write::NoSeek;
 use mcap::{Attachment, WriteOptions, Writer};
 
-use super::content::{ContentCheck, Sound};
+use super::content::{ContentCheck, Validity};
 use super::losses::Losses;
 use super::lost_load::LoadRows;
 use crate::log::encoding::{MessageEncoder, TopicFormat, encode_transform};
@@ -57,7 +57,7 @@ pub(super) struct Format {
 }
 
 /// The output of a repair.
-pub(super) struct Salvage<W: Write> {
+pub(super) struct RepairWriter<W: Write> {
     /// `None` after an error. Dropping the writer of mcap would finish the file.
     file: Option<Writer<NoSeek<W>>>,
     /// The header of a snapshot, until its payload has followed.
@@ -73,7 +73,7 @@ pub(super) struct Salvage<W: Write> {
     pub(super) losses: Losses,
 }
 
-impl<W: Write> Salvage<W> {
+impl<W: Write> RepairWriter<W> {
     pub(super) fn create(out: W, format: &Format) -> Result<Self, WriteError> {
         // The level of a recording. Other compressions have none.
         let (compression, level) = match format.compression.as_deref() {
@@ -307,11 +307,11 @@ impl<W: Write> Salvage<W> {
             self.drop_row(content);
         }
         match content.check(header, data) {
-            Ok(Sound::Row) => {
+            Ok(Validity::Row) => {
                 let step = content.row_step().unwrap_or(0);
                 self.row = Some(HeldRow { header: *header, data: data.to_vec(), step });
             }
-            Ok(Sound::Payload) => {
+            Ok(Validity::Payload) => {
                 let row = self.row.take().map(|row| (row.header, row.data, row.step));
                 if let Some((row_header, row_data, step)) = row {
                     self.losses.end_gap(step);
@@ -319,7 +319,7 @@ impl<W: Write> Salvage<W> {
                 }
                 self.write(|file| file.write_to_known_channel(header, data))?;
             }
-            Ok(Sound::Other | Sound::Update(_)) => {
+            Ok(Validity::Other | Validity::Update(_)) => {
                 // A header without a payload ends a gap, too.
                 if let (Some(Topic::Steps), Some(row)) = (topic, content.last_row()) {
                     self.losses.end_gap(row.step);
@@ -379,7 +379,7 @@ impl<W: Write> Salvage<W> {
     }
 }
 
-impl<W: Write> Drop for Salvage<W> {
+impl<W: Write> Drop for RepairWriter<W> {
     fn drop(&mut self) {
         self.abandon();
     }

@@ -1,11 +1,12 @@
-//! The end of a file, and the reasons why a file cannot be read as a recording.
+//! The end of a file, and the reasons why a file cannot be read as a recording, signals included.
 
 use std::fmt;
 use std::io;
 use std::path::PathBuf;
 
-use super::file_source::Interrupted;
-use crate::log::run::FORMAT_VERSION;
+use sim_contract::Stop;
+
+use super::run::FORMAT_VERSION;
 
 /// The end of a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -159,6 +160,19 @@ pub enum ReadError {
         /// The step of the snapshot.
         step: u64,
     },
+}
+
+/// The content of the error of a read after a signal.
+#[derive(Debug, thiserror::Error)]
+#[error("interrupted")]
+struct Interrupted;
+
+/// Returns an error after a signal.
+pub(super) fn check_stop(stop: Option<&Stop>) -> io::Result<()> {
+    match stop {
+        Some(stop) if stop.is_requested() => Err(io::Error::other(Interrupted)),
+        _ => Ok(()),
+    }
 }
 
 impl From<io::Error> for ReadError {

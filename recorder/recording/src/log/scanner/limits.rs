@@ -54,6 +54,11 @@ impl SizeLimits {
         }
     }
 
+    /// Describes a part of a file that is longer than its scene can need.
+    pub(in crate::log) fn exceeded(part: &str, size_bytes: u64, size_bytes_max: u64) -> String {
+        format!("{part} of {size_bytes} bytes (allowed: up to {size_bytes_max} for its scene)")
+    }
+
     /// Returns the length of the longest message on a topic.
     pub(in crate::log) fn message_size_bytes_max(&self, topic: Topic) -> u64 {
         let Self { particle_count, constraint_count, bend_count, scene_size_bytes } = *self;
