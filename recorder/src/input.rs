@@ -2,4 +2,3 @@
 
 pub(crate) mod command_source;
 pub(crate) mod scene_source;
-mod text_file;

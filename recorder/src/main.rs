@@ -11,7 +11,7 @@ mod input;
 use clap::{CommandFactory, Parser, Subcommand};
 use sim_cli::DocumentVerb;
 
-use cli::exit::{self, Exit};
+use cli::output::{self, Exit};
 use commands::{
     check, diff, export as export_command, info, play, record, repair, restore, scene, simulate,
     state, verify,
@@ -75,9 +75,9 @@ enum Command {
 fn main() -> Exit {
     let words: Vec<_> = std::env::args_os().collect();
     let args = Args::try_parse_from(&words).unwrap_or_else(|error| {
-        exit::with_usage(&sim_cli::explain(error, &Args::command(), &words))
+        output::with_usage(&sim_cli::explain(error, &Args::command(), &words))
     });
-    exit::from_result(run(&args.command))
+    output::from_result(run(&args.command))
 }
 
 fn run(command: &Command) -> anyhow::Result<Exit> {

@@ -63,10 +63,12 @@ mod recorded_scene;
 mod scene_drawing;
 mod scene_state;
 pub mod simulation;
-mod state_place;
 pub mod verification;
 
-pub use complete_state::{CompleteState, CompleteStateError, complete_state};
+pub use complete_state::{
+    CompleteState, CompleteStateError, FindStateError, StatePlace, Wanted, complete_state,
+    find_state,
+};
 pub use counted::counted;
 pub use intact_parts::{IntactParts, RepairedBytes, load_rows};
 pub use log::*;
@@ -75,4 +77,3 @@ pub use scene_drawing::{DrawnMesh, SCENE_TOPIC, SceneDrawing};
 pub use scene_state::{SceneState, SceneStateError, visit_states};
 pub use sim_contract::{Existing, PartFile, PartFileError};
 pub use sim_solver::scene::Up;
-pub use state_place::{FindStateError, StatePlace, Wanted, find_state};

@@ -1,7 +1,6 @@
 //! The recording format, from the bytes of a message to the state at any step, and files of commands in
 //! the form of its outcomes.
 
-mod backlog;
 mod command_file;
 mod container;
 pub(crate) mod encoding;
@@ -19,7 +18,6 @@ mod tears;
 mod topic;
 mod writer;
 
-pub use backlog::Backlog;
 pub use command_file::{CommandFileError, TimedCommand, parse_commands, sort_commands};
 pub use container::check::check_file;
 pub use container::finding::{
@@ -34,7 +32,7 @@ pub use encoding::{
 };
 pub use index::{ChunkEntry, IndexedLog};
 pub use input_file::{FileSource, open_recording, open_regular_file};
-pub use message::Message;
+pub use message::{Backlog, Message};
 pub use read::decode::LoggedMessage;
 pub use read::frames::{Frame, FrameReader};
 pub use read::gaps::GapCounter;

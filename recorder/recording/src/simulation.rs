@@ -1,13 +1,8 @@
 //! Steps a scene with commands in this process and writes the recording of a live run.
 
-mod apply;
 pub(crate) mod frozen;
 mod job;
-mod kept_states;
-mod result;
-pub(crate) mod run_id;
-pub(crate) mod solver_rows;
-mod state_writer;
+pub(crate) mod state_writer;
 mod stepped_recording;
 
 use std::io::Write;
@@ -17,15 +12,13 @@ use crate::log::{LogWriter, TimedCommand, WriteError};
 use sim_contract::{Action, Reason};
 use sim_solver::Solver;
 
-pub use apply::apply;
 pub use frozen::{FrozenParticles, FrozenTracker};
-pub use job::{Job, Start};
-use kept_states::KeptStates;
-pub use kept_states::State;
-pub use result::{SimulationResult, StepCount};
-pub use solver_rows::{colliders_row, forces_row, step_row};
+use job::KeptStates;
+pub use job::{Job, SimulationResult, Start, State, StepCount, apply};
 use state_writer::StateWriter;
-pub use state_writer::{begin_log, finish_log, recording_bytes};
+pub use state_writer::{
+    begin_log, colliders_row, finish_log, forces_row, recording_bytes, step_row,
+};
 pub use stepped_recording::{SteppedRecording, SteppedRecordingError};
 
 /// The states of a simulation that it does not compute.

@@ -4,9 +4,7 @@
 //! are simulated side by side: each from its recorded state up to the recorded state with which the next part begins.
 //! If all of them are identical, the first state leads to the last one.
 
-mod difference;
 mod finding;
-mod header;
 mod part;
 mod past_states;
 mod report;
@@ -21,14 +19,14 @@ use sim_solver::Solver;
 
 use crate::log::{Frame, FrameReader, GapCounter, LogEnd, LogReader, Message, ReadError};
 use crate::recorded_scene::{RecordedSceneError, scene_to_simulate};
-pub use difference::{
-    Difference, SnapshotDifference, distance, first_difference, snapshot_difference,
+pub use finding::{
+    Difference, NotIdentical, SnapshotDifference, SnapshotFinding, StepGap, distance,
+    first_difference, snapshot_difference,
 };
-pub use finding::{NotIdentical, SnapshotFinding, StepGap};
-use header::{compare_counts, compare_load, compare_run};
 use part::{PartResult, Parts};
 pub use report::{Verdict, VerifyReport};
 pub use resimulation::{Resimulation, ResimulationError};
+use rows::{compare_counts, compare_load, compare_run};
 
 /// Snapshots between two calls of `on_progress`.
 const SNAPSHOTS_PER_UPDATE: u64 = 64;

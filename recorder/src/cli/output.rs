@@ -1,15 +1,17 @@
-//! Output of the program: results on stdout, everything else on stderr.
+//! Output of the program: results on stdout, everything else on stderr, progress on a terminal, and the exit codes.
 
+use std::io::{self, IsTerminal};
 use std::path::Path;
+use std::process::{ExitCode, Termination};
 use std::sync::LazyLock;
 
 use anyhow::Context;
-use indicatif::ProgressBar;
+use indicatif::{ProgressBar, ProgressStyle};
 use recording::LogEnd;
 use serde::Serialize;
 use sim_contract::{console, is_being_written, printable, printable_line};
 
-use super::progress::live_line;
+use super::damaged_input::DamagedInput;
 
 /// The option that selects the format of a result.
 #[derive(Debug, Clone, Copy, clap::Args)]
@@ -102,6 +104,77 @@ pub(crate) fn incomplete(recording: &str, part_path: &Path) -> String {
 /// Returns a path as text for users.
 pub(crate) fn path_text(path: &Path) -> String {
     path.display().to_string()
+}
+
+/// Returns a progress bar for a known number of steps.
+pub(crate) fn progress_bar(steps: u64) -> ProgressBar {
+    if !io::stderr().is_terminal() {
+        return ProgressBar::hidden();
+    }
+    let style = ProgressStyle::with_template("{bar:40} {pos}/{len} steps, {eta} left")
+        .unwrap_or_else(|_| ProgressStyle::default_bar());
+    ProgressBar::new(steps).with_style(style)
+}
+
+/// Returns a spinner with a message.
+pub(crate) fn progress_spinner() -> ProgressBar {
+    if io::stderr().is_terminal() { ProgressBar::new_spinner() } else { ProgressBar::hidden() }
+}
+
+/// Returns a line of text that changes in place.
+pub(crate) fn live_line() -> ProgressBar {
+    let style = ProgressStyle::with_template("{msg}");
+    let style = style.unwrap_or_else(|_| ProgressStyle::default_spinner());
+    progress_spinner().with_style(style)
+}
+
+/// Returns a progress bar for a known number of bytes.
+pub(crate) fn progress_bytes(bytes: u64) -> ProgressBar {
+    if !io::stderr().is_terminal() {
+        return ProgressBar::hidden();
+    }
+    let template = "{bar:40} {bytes}/{total_bytes}, {bytes_per_sec}, {eta} left";
+    let style =
+        ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
+    ProgressBar::new(bytes).with_style(style)
+}
+
+/// The exit code.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Exit {
+    /// 0: success.
+    Done,
+    /// 1: failure, with the reason on stderr. (2 is a usage error, with which clap exits.)
+    Failed,
+    /// 3: finished, but with loss, truncation or divergence; or the input is so damaged that nothing of it can be
+    /// used.
+    Loss,
+}
+
+impl Termination for Exit {
+    fn report(self) -> ExitCode {
+        match self {
+            Self::Done => ExitCode::SUCCESS,
+            Self::Failed => ExitCode::FAILURE,
+            Self::Loss => ExitCode::from(3),
+        }
+    }
+}
+
+/// Returns the exit code of a subcommand. Prints an error and its causes as one line on stderr.
+pub(crate) fn from_result(result: anyhow::Result<Exit>) -> Exit {
+    result.unwrap_or_else(|error| {
+        console::note(&format!("error: {error:#}"));
+        if error.is::<DamagedInput>() { Exit::Loss } else { Exit::Failed }
+    })
+}
+
+/// Ends the program as clap does: with code 2 after an error of the command line, with 0 after a help
+/// text, or with 1 if that cannot be written.
+#[allow(clippy::exit, reason = "clap ends the program in the same way")]
+pub(crate) fn with_usage(error: &clap::Error) -> ! {
+    let (printed, code) = (error.print(), error.exit_code());
+    std::process::exit(console::usage_exit_code(printed, error.use_stderr(), code))
 }
 
 #[cfg(test)]

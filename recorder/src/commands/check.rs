@@ -10,9 +10,7 @@ use recording::{
 use serde::Serialize;
 use sim_contract::{Stop, printable_line};
 
-use crate::cli::exit::Exit;
-use crate::cli::output::{self, AsJson};
-use crate::cli::progress::progress_bytes;
+use crate::cli::output::{self, AsJson, Exit, progress_bytes};
 
 #[derive(Debug, clap::Args)]
 #[command(

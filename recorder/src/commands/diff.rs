@@ -1,7 +1,6 @@
 //! `recorder diff`: shows where two recordings come apart, and how their distance grows.
 
 mod comparison;
-mod growth;
 mod report;
 
 use std::path::{Path, PathBuf};
@@ -11,9 +10,7 @@ use recording::{FileSource, FrameReader, LogEnd, LogReader};
 use sim_contract::Stop;
 
 use crate::cli::damaged_input::lacks;
-use crate::cli::exit::Exit;
-use crate::cli::output::{self, AsJson};
-use crate::cli::progress::progress_spinner;
+use crate::cli::output::{self, AsJson, Exit, progress_spinner};
 use comparison::Comparison;
 
 /// Compared steps between two updates of the progress.

@@ -21,12 +21,10 @@ use recording::{
 };
 use sim_contract::Stop;
 
+use crate::cli::args::{OverwriteArgs, refuse_own_input};
 use crate::cli::damaged_input::{intact_parts, lacks};
-use crate::cli::exit::{self, Exit};
-use crate::cli::file_args::{OverwriteArgs, refuse_own_input};
-use crate::cli::output::{self, AsJson};
+use crate::cli::output::{self, AsJson, Exit, progress_bar, progress_bytes};
 use crate::cli::parse::{self, whole_number_in};
-use crate::cli::progress::{progress_bar, progress_bytes};
 use crate::export::frame_names::FrameNames;
 use crate::export::pictures::target::Target;
 use crate::export::selection::{Choice, Moment, Selection, SnapshotRange};
@@ -149,7 +147,7 @@ enum StyleArg {
 }
 
 pub(crate) fn run(args: &ExportArgs) -> anyhow::Result<Exit> {
-    args.check().unwrap_or_else(|error| exit::with_usage(&error));
+    args.check().unwrap_or_else(|error| output::with_usage(&error));
     let stop = Stop::install()?;
     let path = output::path_text(&args.file);
     let open = || LogReader::open_until(&args.file, &stop);

@@ -1,11 +1,9 @@
 //! `recorder info`: the content of a recording.
 
-mod bins;
 mod columns;
 mod energy;
 mod graph;
 mod report;
-mod survey;
 mod timing;
 
 use std::fs;
@@ -17,15 +15,13 @@ use recording::pictures::encode_svg;
 use recording::{IntactParts, LogEnd, LogReader, Message, PartFile, ReadError};
 use sim_contract::Stop;
 
+use crate::cli::args::OverwriteArgs;
 use crate::cli::damaged_input::intact_parts;
-use crate::cli::exit::Exit;
-use crate::cli::file_args::OverwriteArgs;
-use crate::cli::output::{self, AsJson};
+use crate::cli::output::{self, AsJson, Exit};
 use columns::{ColumnCollector, Columns};
 use energy::EnergyReport;
 use graph::{COLUMNS_MAX, Graph};
-use report::Info;
-use survey::inspect;
+use report::{Info, inspect};
 use timing::{Timing, period_ns};
 
 #[derive(Debug, clap::Args)]

@@ -1,10 +1,7 @@
 //! `recorder play`: plays a recording on the services of a node.
 
-mod complete_state;
 mod control;
 mod keyboard;
-mod keys;
-mod live;
 mod lockstep;
 mod pace;
 mod player;
@@ -23,9 +20,8 @@ use anyhow::bail;
 use sim_contract::clock::SECOND_NS;
 use sim_contract::{Stop, report_bus_errors};
 
-use crate::cli::endpoint_args::EndpointArgs;
-use crate::cli::exit::{self, Exit};
-use crate::cli::output;
+use crate::cli::args::EndpointArgs;
+use crate::cli::output::{self, Exit};
 use crate::cli::parse::{self, whole_number};
 use control::{Control, MAX_RATE, RATES};
 use keyboard::Keyboard;
@@ -76,7 +72,7 @@ fn after_help() -> String {
          recorder play run.mcap --rate 0.25 --loop\n  \
          recorder play run_*.mcap --paused\n  \
          recorder play run.mcap --start 2s --end 3500ms --wait-for-readers 1",
-        keys::HELP
+        keyboard::HELP
     )
 }
 
@@ -101,7 +97,7 @@ fn play(args: &PlayArgs, stop: &Stop) -> anyhow::Result<Exit> {
     let endpoint = args.endpoint.endpoint()?;
     if args.end.is_some_and(|end| end < args.start.unwrap_or_default()) {
         let problem = "--end is before --start: nothing would be played\n";
-        exit::with_usage(&clap::Error::raw(clap::error::ErrorKind::ValueValidation, problem));
+        output::with_usage(&clap::Error::raw(clap::error::ErrorKind::ValueValidation, problem));
     }
     let playlist = Playlist::open(&args.files, stop)?;
     let mut player = Player {

@@ -27,8 +27,7 @@ use sim_contract::{
     Tap, console, report_bus_errors,
 };
 
-use crate::cli::exit::{self, Exit};
-use crate::cli::output;
+use crate::cli::output::{self, Exit};
 pub(crate) use args::{RecordArgs, SingleStateArgs};
 use feed::Feed;
 use feed::time_limit::TimeLimit;
@@ -60,7 +59,7 @@ const IGNORED_SIGNAL: &str = "warning: SIGUSR1 writes the memory of a black box,
                               recording goes on";
 
 pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
-    args.check().unwrap_or_else(|error| exit::with_usage(&error));
+    args.check().unwrap_or_else(|error| output::with_usage(&error));
     if let Some(output) = &args.output {
         output::warn_of_extension(output, &["mcap"]);
     }

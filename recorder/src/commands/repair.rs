@@ -13,10 +13,8 @@ use recording::{
 use serde::Serialize;
 use sim_contract::{Stop, is_being_written, printable_line};
 
-use crate::cli::exit::Exit;
-use crate::cli::file_args::{OverwriteArgs, refuse_own_input};
-use crate::cli::output::{self, AsJson};
-use crate::cli::progress::progress_bytes;
+use crate::cli::args::{OverwriteArgs, refuse_own_input};
+use crate::cli::output::{self, AsJson, Exit, progress_bytes};
 
 #[derive(Debug, clap::Args)]
 #[command(

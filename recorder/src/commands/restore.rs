@@ -16,12 +16,10 @@ use sim_contract::{
 };
 use sim_solver::SOLVER_VERSION;
 
+use crate::cli::args::{EndpointArgs, ThreadArgs};
 use crate::cli::damaged_input::{lacks, lacks_state};
-use crate::cli::endpoint_args::EndpointArgs;
-use crate::cli::exit::Exit;
-use crate::cli::output::{self, AsJson, path_text};
+use crate::cli::output::{self, AsJson, Exit, path_text};
 use crate::cli::parse::{self, whole_number};
-use crate::cli::thread_args::ThreadArgs;
 
 #[derive(Debug, clap::Args)]
 #[command(

@@ -7,9 +7,8 @@ use anyhow::{Context, bail};
 use recording::{LogReader, PartFile};
 use sim_contract::printable;
 
-use crate::cli::exit::Exit;
-use crate::cli::file_args::OverwriteArgs;
-use crate::cli::output::{self, path_text};
+use crate::cli::args::OverwriteArgs;
+use crate::cli::output::{self, Exit, path_text};
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \

@@ -20,12 +20,9 @@ use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{Action, Outcome, Reason, Stop, allowed_indices, part_path, printable_line};
 use sim_solver::{Scene, Solver};
 
-use crate::cli::exit::{Exit, with_usage};
-use crate::cli::file_args::{FileArgs, LogFile};
-use crate::cli::output::{self, AsJson};
+use crate::cli::args::{FileArgs, LogFile, ThreadArgs};
+use crate::cli::output::{self, AsJson, Exit, progress_bar, progress_spinner, with_usage};
 use crate::cli::parse::whole_number;
-use crate::cli::progress::{progress_bar, progress_spinner};
-use crate::cli::thread_args::ThreadArgs;
 use crate::input::command_source::CommandSource;
 use crate::input::scene_source::{is_recording, load_scene};
 use changes::{Changed, Changes, Survey, parse_setting};

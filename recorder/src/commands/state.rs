@@ -1,6 +1,6 @@
 //! `recorder state`: records one step of a running node.
 
-use crate::cli::exit::Exit;
+use crate::cli::output::Exit;
 use crate::commands::record::{self, RecordArgs, SingleStateArgs};
 
 #[derive(Debug, clap::Args)]

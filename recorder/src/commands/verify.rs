@@ -11,12 +11,10 @@ use recording::verification::{
 use recording::{IntactParts, LogEnd, LogReader, ReadError, Wanted, find_state};
 use sim_contract::{Stop, printable_line};
 
+use crate::cli::args::PartArgs;
 use crate::cli::damaged_input::{DamagedInput, intact_parts, lacks, lacks_state};
-use crate::cli::exit::Exit;
-use crate::cli::output::{self, AsJson};
+use crate::cli::output::{self, AsJson, Exit, progress_bytes};
 use crate::cli::parse::whole_number;
-use crate::cli::progress::progress_bytes;
-use crate::cli::thread_args::PartArgs;
 
 #[derive(Debug, clap::Args)]
 #[command(

@@ -9,8 +9,7 @@ use recording::{
 };
 use sim_contract::Stop;
 
-use super::scene_source::is_recording;
-use super::text_file::read_text_file;
+use super::scene_source::{is_recording, read_text_file};
 
 /// Largest command file, in bytes: several hours of commands at 60 Hz.
 const COMMAND_FILE_SIZE_BYTES_MAX: u64 = 1 << 30;

@@ -1,10 +1,11 @@
 //! Loads scenes from built-in scenes, files and recordings.
 
+use std::io::{self, ErrorKind, Read};
 use std::path::Path;
 
 use anyhow::{Context, anyhow};
-use recording::{LogReader, recorded_scene};
-use sim_contract::{Stop, read_scene_file};
+use recording::{LogReader, open_regular_file, recorded_scene};
+use sim_contract::{Stop, read_scene_file, to_text};
 use sim_solver::Scene;
 use sim_solver::scene::LoadError;
 
@@ -29,6 +30,18 @@ const EXTENSION: &str = ".mcap";
 /// Returns `true` for the path of a recording, finished or not. The documented rule is case-sensitive.
 pub(crate) fn is_recording(source: &str) -> bool {
     source.strip_suffix(".part").unwrap_or(source).ends_with(EXTENSION)
+}
+
+/// Reads a regular file of at most `size_bytes_max` bytes.
+pub(crate) fn read_text_file(path: &Path, size_bytes_max: u64) -> io::Result<String> {
+    let file = open_regular_file(path)?;
+    let mut bytes = Vec::new();
+    let size_bytes = file.take(size_bytes_max + 1).read_to_end(&mut bytes)? as u64;
+    if size_bytes > size_bytes_max {
+        let problem = format!("it is longer than {size_bytes_max} bytes");
+        return Err(io::Error::new(ErrorKind::FileTooLarge, problem));
+    }
+    to_text(bytes).map_err(io::Error::other)
 }
 
 #[cfg(test)]

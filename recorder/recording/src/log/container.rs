@@ -10,5 +10,3 @@ pub(super) mod lost_load;
 mod places;
 pub(super) mod repair;
 mod repair_writer;
-mod summary;
-mod tears;

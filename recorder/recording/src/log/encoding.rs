@@ -1,13 +1,14 @@
 //! The encoding and the schema of each topic, for files and for servers that send the same messages.
 
 mod descriptor;
-mod json_schema;
 mod particle_buffer;
 pub(crate) mod protobuf;
 pub(crate) mod scene_messages;
 
 use schemars::JsonSchema;
+use schemars::generate::SchemaSettings;
 use serde::Serialize;
+use serde_json::{Map, Value};
 use sim_contract::ParticleState;
 
 use super::message::Message;
@@ -17,7 +18,6 @@ use super::rows::{
 };
 use super::topic::Topic;
 use descriptor::{FRAME_TRANSFORM, KEYFRAME, POINT_CLOUD, SCENE_UPDATE, file_descriptor_set};
-use json_schema::row_schema;
 pub use particle_buffer::ParticleBuffer;
 pub use protobuf::{MAP_FRAME, WORLD_FRAME, encode_transform, map_from_world};
 pub(super) use protobuf::{decode_keyframe, decode_particles, particle_bytes};
@@ -128,4 +128,59 @@ impl MessageEncoder {
 fn json<T: Serialize>(row: &T, scratch: &mut Vec<u8>) -> Result<(), serde_json::Error> {
     scratch.clear();
     serde_json::to_writer(scratch, row)
+}
+
+/// Returns the schema of the rows of a type, as they are written.
+fn row_schema<T: JsonSchema>() -> Value {
+    let settings = SchemaSettings::draft2020_12().for_serialize();
+    let settings = settings.with(|settings| settings.inline_subschemas = true);
+    let mut schema = settings.into_generator().into_root_schema_for::<T>().to_value();
+    simplify(&mut schema);
+    schema
+}
+
+/// Moves the properties that viewers do not accept, in this object and those within it.
+fn simplify(schema: &mut Value) {
+    if let Some(items) = schema.get_mut("items") {
+        simplify(items);
+    }
+    if schema["type"] != "object" {
+        return;
+    }
+    let required = schema["required"].as_array().cloned().unwrap_or_default();
+    let (mut accepted, mut others) = (Map::new(), Map::new());
+    for (name, mut property) in schema["properties"].as_object().cloned().unwrap_or_default() {
+        if !required.contains(&Value::from(name.as_str())) {
+            remove_null(&mut property);
+        }
+        simplify(&mut property);
+        if is_accepted(&property) {
+            accepted.insert(name, property);
+        } else {
+            others.insert(format!("^{name}$"), property);
+        }
+    }
+    schema["properties"] = accepted.into();
+    if !others.is_empty() {
+        schema["patternProperties"] = others.into();
+    }
+}
+
+/// Removes null from the types of a property that a row leaves out instead.
+fn remove_null(property: &mut Value) {
+    let Some(types) = property.get_mut("type").and_then(Value::as_array_mut) else { return };
+    types.retain(|one| one != "null");
+    if let [one] = types.as_slice() {
+        property["type"] = one.clone();
+    }
+}
+
+/// Returns `true` if viewers accept a property.
+fn is_accepted(property: &Value) -> bool {
+    let is_plain = |schema: &Value| {
+        ["boolean", "string", "number", "integer", "object"]
+            .iter()
+            .any(|one| schema["type"] == **one)
+    };
+    is_plain(property) || property["type"] == "array" && is_plain(&property["items"])
 }

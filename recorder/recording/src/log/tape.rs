@@ -1,9 +1,6 @@
 //! A recording as a tape that winds to any step. It reads only the chunks around the step.
 
 mod chunk_reader;
-mod chunks;
-mod digest;
-mod load;
 mod search;
 
 use std::fs::File;
@@ -14,6 +11,7 @@ use sim_contract::{ParticleState, Stop, Torn};
 
 use super::index::IndexedLog;
 use super::input_file::{FileSource, open_recording};
+use super::message::Message;
 use super::read::frames::FrameReader;
 use super::read_error::{LogEnd, ReadError};
 use super::rows::{
@@ -23,7 +21,6 @@ use super::run::RunDescription;
 use super::tears::{TearChange, TearTracker};
 use super::topic::Topic;
 use chunk_reader::ChunkReader;
-use load::read_load;
 use search::{SnapshotPosition, StepRange, find, first_and_last};
 
 /// The reason why a recording cannot be shown.
@@ -328,4 +325,41 @@ impl Tape {
         }
         Ok(from_start)
     }
+}
+
+/// The rows of a load, if the file has readable ones.
+#[derive(Debug, Default)]
+struct Load {
+    topology: Option<TopologyRow>,
+    surface: Option<SurfaceRow>,
+    /// A chunk that may have had them cannot be read.
+    has_damage: bool,
+}
+
+/// Reads the load. A file has one load, in its first chunks, before the first snapshot.
+fn read_load(log: &mut IndexedLog) -> Result<Load, ReadError> {
+    let mut load = Load::default();
+    for chunk in 0..log.chunks().len() {
+        if load.topology.is_some() && load.surface.is_some() {
+            break;
+        }
+        if !log.chunks()[chunk].has_any(&[Topic::Topology, Topic::Surface]) {
+            continue;
+        }
+        let messages = match log.read_chunk(chunk) {
+            Err(ReadError::DamagedChunk { .. } | ReadError::Malformed { .. }) => {
+                load.has_damage = true;
+                continue;
+            }
+            read => read?,
+        };
+        for logged in messages {
+            match logged.message {
+                Message::Topology(row) => _ = load.topology.get_or_insert(row),
+                Message::Surface(row) => _ = load.surface.get_or_insert(row),
+                _ => {}
+            }
+        }
+    }
+    Ok(load)
 }

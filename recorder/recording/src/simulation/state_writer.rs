@@ -2,16 +2,18 @@
 
 use std::io::Write;
 
-use crate::log::{
-    Closing, ColliderRow, LogOptions, LogWriter, Message, OutcomeRow, ParametersRow,
-    RunDescription, SceneColliders, StepRow, SurfaceRow, TopologyRow, WriteError,
+use sim_contract::{
+    ColliderState, LoadHeader, Outcome, ParameterValues, ParticleState, PlainF32, Reason,
 };
-use sim_contract::{LoadHeader, Outcome, ParameterValues, ParticleState, Reason};
-use sim_solver::{Applied, EnergyMeter, Scene, Solver};
+use sim_solver::{Applied, EnergyMeter, PlacedCollider, Scene, Solver};
 
 use super::frozen::{FrozenParticles, FrozenTracker};
-use super::job::Start;
-use super::solver_rows::{colliders_row, forces_row, new_tears_row, step_row};
+use super::job::{Start, count};
+use crate::log::{
+    AnchorForceRow, Closing, ColliderForceRow, ColliderRow, CollidersRow, ForcesRow, LogOptions,
+    LogWriter, Message, OutcomeRow, ParametersRow, RunDescription, SceneColliders, StepRow,
+    SurfaceRow, TearsRow, TopologyRow, WriteError,
+};
 
 /// Returns the memory that the recording of a simulation takes beside its solver, in bytes: for another solver of the scene as
 /// loaded, and for rows and their encoded messages.
@@ -193,4 +195,74 @@ fn changes<T: Clone + PartialEq>(last: &mut Option<T>, now: &T) -> bool {
         *last = Some(now.clone());
     }
     is_changed
+}
+
+/// Returns the row of `step`, of a recording of every step, without the number of outcomes.
+pub fn step_row(solver: &Solver, step: u64) -> StepRow {
+    StepRow {
+        step,
+        scene_step: solver.scene_step(),
+        state_hash: solver.state_hash(),
+        torn_count: count(solver.torn().len()),
+        snapshot_index: low_32_bits(step),
+        ..StepRow::default()
+    }
+}
+
+#[allow(clippy::cast_possible_truncation, reason = "the low half is wanted")]
+fn low_32_bits(step: u64) -> u32 {
+    step as u32
+}
+
+/// Returns the colliders after `step`.
+pub fn colliders_row(solver: &Solver, step: u64) -> CollidersRow {
+    let states: Vec<_> = solver.colliders().map(|collider| state(&collider)).collect();
+    // Every shape of this solver has a row.
+    CollidersRow::new(step, &states).unwrap_or(CollidersRow { step, colliders: Vec::new() })
+}
+
+/// Returns the tears of the last step, which is `step`, or `None` if there are none. All tears of a state
+/// that a command put in place count as those of its step.
+pub(crate) fn new_tears_row(solver: &Solver, step: u64, is_in_place: bool) -> Option<TearsRow> {
+    let count = if is_in_place { solver.torn().len() } else { solver.new_torn_count() };
+    (count > 0).then(|| newest_tears_row(solver, step, count))
+}
+
+/// Returns the newest `count` torn constraints, or all if there are fewer.
+pub(crate) fn newest_tears_row(solver: &Solver, step: u64, count: usize) -> TearsRow {
+    let first = solver.torn().len().saturating_sub(count);
+    let causes = solver.tear_causes()[first..].iter();
+    TearsRow {
+        step,
+        constraints: solver.torn()[first..].to_vec(),
+        causes: causes.map(|cause| cause.name().to_owned()).collect(),
+    }
+}
+
+/// Returns a collider as a node publishes it.
+fn state(collider: &PlacedCollider) -> ColliderState {
+    let PlacedCollider { shape, restitution, friction, velocity, angular_velocity } = *collider;
+    ColliderState { restitution, friction, velocity, angular_velocity, ..shape.fields().into() }
+}
+
+/// Returns the forces of the last step, which is `step`, if the solver computes them.
+pub fn forces_row(solver: &Solver, step: u64) -> Option<ForcesRow> {
+    let forces = solver.forces()?;
+    let plain = |vector: [f32; 3]| vector.map(PlainF32);
+    let colliders = forces.colliders.iter().map(|one| ColliderForceRow {
+        impulse: plain(one.impulse.linear),
+        angular_impulse: plain(one.impulse.angular),
+        contacts: one.contacts,
+    });
+    let anchors = forces.anchors.iter().map(|one| AnchorForceRow {
+        impulse: plain(one.linear),
+        angular_impulse: plain(one.angular),
+    });
+    Some(ForcesRow {
+        step,
+        colliders: colliders.collect(),
+        anchors: anchors.collect(),
+        particles: forces.particles.iter().map(|one| one.particle).collect(),
+        impulses: forces.particles.iter().map(|one| plain(one.impulse)).collect(),
+    })
 }

@@ -11,9 +11,7 @@ use crate::log::{
     replace_run_id,
 };
 
-use super::job::{Job, Start};
-use super::result::SimulationResult;
-use super::run_id::RunId;
+use super::job::{Job, RunId, SimulationResult, Start};
 use super::state_writer::{StateWriter, begin_log, finish_log};
 
 /// The reason why a simulation could not be recorded.

@@ -6,8 +6,7 @@ use std::fmt;
 use serde::{Serialize, Serializer};
 use sim_contract::printable_line;
 
-use super::difference::Difference;
-use super::finding::{SnapshotFinding, StepGap};
+use super::finding::{Difference, SnapshotFinding, StepGap};
 use super::part::PartResult;
 use super::past_states::AllStates;
 use crate::counted;

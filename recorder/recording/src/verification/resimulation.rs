@@ -7,8 +7,7 @@ use crate::log::{EnergyRow, Frame, Message, OutcomeRow, StepRow, TearTracker, To
 use sim_contract::{Action, Outcome, ParticleState, RestoreContents};
 use sim_solver::{Applied, Control, EnergyMeter, Keyframe, Scene, Solver};
 
-use super::difference::{Difference, first_difference};
-use super::finding::{SnapshotFinding, StepGap};
+use super::finding::{Difference, SnapshotFinding, StepGap, first_difference};
 use super::past_states::PastStates;
 use super::rows::{compare_row, ignore_collider_velocities, newest_rows};
 use crate::simulation::apply;

@@ -9,8 +9,9 @@ use recording::{FileSource, Frame, FrameReader, LogEnd, Message, OutcomeRow};
 use serde_json::Value;
 use sim_contract::{Action, ParticleState};
 
-use super::growth::{Distance, Growth};
-use super::report::{CommandDifference, Report, SceneDifference, StateDifference};
+use super::report::{
+    CommandDifference, Distance, Growth, Report, SceneDifference, StateDifference,
+};
 
 /// One of the two recordings.
 struct Side {

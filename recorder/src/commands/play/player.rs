@@ -7,14 +7,13 @@ use sim_contract::clock::{SECOND_NS, monotonic_ns, sleep_until};
 use sim_contract::{Action, Command, Endpoint, Owner, Reason, ReceivedCommand, Stop};
 
 use super::control::{Control, Request, Target};
-use super::keyboard::Keyboard;
-use super::keys::Key;
-use super::live::{self, Shown};
+use super::keyboard::{Key, Keyboard};
 use super::lockstep::Lockstep;
 use super::pace::Pace;
 use super::playlist::{Place, Playlist};
 use super::recording::Start;
 use super::replay::{Playback, Replay};
+use crate::cli::output;
 
 /// Longest wait before the next check for commands, keys, readers and signals.
 const WAIT_MAX_NS: u64 = SECOND_NS / 100;
@@ -342,7 +341,7 @@ impl Player {
             lockstep: &self.lockstep,
             is_at_end: self.is_at_end,
         })?;
-        live::show(&Shown { time_ns, duration_ns: end_ns - start_ns, step, control: self.control });
+        show_line(&Shown { time_ns, duration_ns: end_ns - start_ns, step, control: self.control });
         Ok(())
     }
 }
@@ -351,4 +350,48 @@ impl Player {
 fn moved_to(command: Command, step: u64) -> Command {
     let action = Action::Rewind { to_step: Some(step), back_steps: None };
     Command::new(command.client_id, command.sequence, action)
+}
+
+/// The content of the line.
+#[derive(Debug)]
+pub(super) struct Shown {
+    /// Time of the last published snapshot, from the start of the replay.
+    pub(super) time_ns: u64,
+    pub(super) duration_ns: u64,
+    pub(super) step: u64,
+    pub(super) control: Control,
+}
+
+/// Shows the line in the place of the last one.
+fn show_line(shown: &Shown) {
+    output::show_live(text(shown));
+}
+
+fn text(shown: &Shown) -> String {
+    let seconds = |ns: u64| ns as f64 / SECOND_NS as f64;
+    let Shown { time_ns, duration_ns, step, control } = shown;
+    let (time, duration) = (seconds(*time_ns), seconds(*duration_ns));
+    let paused = if control.is_paused { ", paused" } else { "" };
+    let rate = if control.rate.is_finite() { control.rate.to_string() } else { "max".to_owned() };
+    format!("{time:.2} s of {duration:.2} s, step {step}, rate {rate}{paused}")
+}
+
+#[cfg(test)]
+mod live_tests {
+    use super::*;
+
+    #[test]
+    fn the_line_has_the_time_the_step_and_the_rate() {
+        let mut control = Control::new(false, 0.25);
+        let line = |control| {
+            let (time_ns, duration_ns) = (1_500_000_000, 10 * SECOND_NS);
+            text(&Shown { time_ns, duration_ns, step: 360, control })
+        };
+        assert_eq!(line(control), "1.50 s of 10.00 s, step 360, rate 0.25");
+        control.rate = f64::INFINITY;
+        assert_eq!(line(control), "1.50 s of 10.00 s, step 360, rate max");
+        control.rate = 0.25;
+        control.set_paused(true);
+        assert_eq!(line(control), "1.50 s of 10.00 s, step 360, rate 0.25, paused");
+    }
 }

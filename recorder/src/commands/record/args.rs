@@ -10,8 +10,7 @@ use super::feed::selector::SelectionArgs;
 use super::split::SplitArgs;
 use super::writing::extras::ExtraArgs;
 use super::writing::names::FileNames;
-use crate::cli::endpoint_args::EndpointArgs;
-use crate::cli::file_args::{FileArgs, default_path};
+use crate::cli::args::{EndpointArgs, FileArgs, default_path};
 use crate::cli::output::AsJson;
 use crate::cli::parse::{self, whole_number};
 

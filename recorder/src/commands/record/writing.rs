@@ -22,7 +22,7 @@ use super::load::RunHeader;
 use super::queue::{Content, Entry, FileEnd, Item, Queue};
 use super::report::Written;
 use super::split::{Ring, WritePosition};
-use crate::cli::file_args::{FileArgs, LogFile};
+use crate::cli::args::{FileArgs, LogFile};
 use crate::cli::output;
 use black_box::{BlackBox, KeptFile};
 use extras::Extras;

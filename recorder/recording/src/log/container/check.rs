@@ -8,8 +8,7 @@ use sim_contract::Stop;
 
 use super::content::ContentCheck;
 use super::finding::{CheckExtent, CheckReport, Findings, after_end_text, record_name};
-use super::places::Places;
-use super::summary::{SummaryCheck, is_of_index};
+use super::places::{Places, SummaryCheck, is_of_index};
 use crate::log::read_error::{LogEnd, ReadError};
 use crate::log::run::selection::{ContentSelection, SELECTION_METADATA};
 use crate::log::run::{CLOSING_METADATA, Closing, RUN_METADATA, SCENE_ATTACHMENT};

@@ -6,7 +6,6 @@ use mcap::records::{Channel, MessageHeader};
 use sim_solver::Keyframe;
 
 use super::lost_load::{LoadRows, LoadWatch, LostLoad};
-use super::tears::HashSeeds;
 use crate::log::encoding::particle_bytes;
 use crate::log::message::{Message, StepOrder};
 use crate::log::read::decode::MessageDecoder;
@@ -17,7 +16,7 @@ use crate::log::rows::{ForcesRow, StepRow, TearsRow};
 use crate::log::run::RunDescription;
 use crate::log::run::selection::ContentSelection;
 use crate::log::scanner::limits::SizeLimits;
-use crate::log::state_hash::hash_bytes;
+use crate::log::state_hash::{HashSeeds, hash_bytes};
 use crate::log::topic::{AllCounts, Topic};
 
 /// Size of a particle in a message.

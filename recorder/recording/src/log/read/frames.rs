@@ -6,9 +6,8 @@ use sim_contract::ParticleState;
 
 use super::decode::LoggedMessage;
 use super::reader::{ChunkStart, LogReader};
-use crate::log::backlog::Backlog;
 use crate::log::input_file::FileSource;
-use crate::log::message::{Message, StepOrder};
+use crate::log::message::{Backlog, Message, StepOrder};
 use crate::log::read_error::{LogEnd, ReadError};
 use crate::log::rows::StepRow;
 use crate::log::topic::Topic;

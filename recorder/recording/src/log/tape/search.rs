@@ -1,7 +1,6 @@
 //! Finds the chunk of a step with few reads.
 
-use super::chunk_reader::ChunkReader;
-use super::chunks::Span;
+use super::chunk_reader::{ChunkReader, Span};
 use crate::log::read_error::ReadError;
 use crate::log::topic::Topic;
 

@@ -1,12 +1,17 @@
-//! Options of the subcommands that write files.
+//! Options that several subcommands share.
 
 use std::fs::{self, File};
+use std::num::NonZero;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
+use std::thread::available_parallelism;
 
 use anyhow::bail;
 use recording::{Compression, Existing, LogOptions, LogWriter, PartFile};
-use sim_contract::part_path;
+use sim_contract::{Endpoint, EndpointError, NAME_DEFAULT, part_path};
+use sim_solver::THREADS_MAX;
+
+use super::parse::whole_number_in;
 
 /// The option to replace existing files.
 #[derive(Debug, Clone, Copy, clap::Args)]
@@ -119,4 +124,61 @@ pub(crate) fn refuse_own_input(input: &File, output: &Path) -> anyhow::Result<()
         }
     }
     Ok(())
+}
+
+/// The name and the domain of a node.
+#[derive(Debug, Clone, clap::Args)]
+pub(crate) struct EndpointArgs {
+    /// Name of the node: its services are NAME/particles, NAME/commands, ...
+    #[arg(long, default_value = NAME_DEFAULT, value_name = "NAME", allow_hyphen_values = true,
+        value_parser = Endpoint::parse_name)]
+    name: String,
+    /// Domain that separates these services from others on this host [env: `CATENARY_DOMAIN`]
+    /// [default: iceoryx2's own domain]
+    #[arg(long, value_name = "DOMAIN", allow_hyphen_values = true,
+        value_parser = Endpoint::parse_domain)]
+    domain: Option<String>,
+}
+
+impl EndpointArgs {
+    /// Returns the endpoint. Without `--domain`, the variable `CATENARY_DOMAIN` gives the domain.
+    pub(crate) fn endpoint(&self) -> Result<Endpoint, EndpointError> {
+        Endpoint::from_options(self.domain.as_deref(), Some(&self.name))
+    }
+}
+
+/// The option of the subcommands that step a solver.
+#[derive(Debug, clap::Args)]
+pub(crate) struct ThreadArgs {
+    /// Number of solver threads, 1 to 64. More threads speed up large scenes and change no bit of
+    /// the result
+    #[arg(long, value_name = "N", default_value_t = 1, allow_hyphen_values = true,
+        value_parser = thread_count)]
+    threads: usize,
+}
+
+/// The option of the subcommand that simulates the parts of a recording side by side.
+#[derive(Debug, clap::Args)]
+pub(crate) struct PartArgs {
+    /// Number of threads that simulate parts of the recording side by side, 1 to 64. Default: the number of cores
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = thread_count)]
+    threads: Option<usize>,
+}
+
+impl PartArgs {
+    pub(crate) fn count(&self) -> usize {
+        let cores = || available_parallelism().map_or(1, NonZero::get).min(THREADS_MAX as usize);
+        self.threads.unwrap_or_else(cores)
+    }
+}
+
+impl ThreadArgs {
+    pub(crate) fn count(&self) -> usize {
+        self.threads
+    }
+}
+
+fn thread_count(text: &str) -> Result<usize, String> {
+    let count = whole_number_in(text, &(1..=u64::from(THREADS_MAX)))?;
+    usize::try_from(count).map_err(|error| error.to_string())
 }
