@@ -5,7 +5,6 @@
 
 mod cli;
 mod commands;
-mod export;
 mod input;
 
 use clap::{CommandFactory, Parser, Subcommand};
@@ -13,8 +12,7 @@ use sim_cli::DocumentVerb;
 
 use cli::output::{self, Exit};
 use commands::{
-    check, diff, export as export_command, info, play, record, repair, restore, scene, simulate,
-    state, verify,
+    check, diff, export, info, play, record, repair, restore, scene, simulate, state, verify,
 };
 
 /// Record a simulation, play it back, and prove that it can be re-simulated bit for bit
@@ -49,7 +47,7 @@ enum Command {
     /// Show where two recordings come apart, and how their distance grows
     Diff(diff::DiffArgs),
     /// Turn a recording into pictures, or into files of other programs
-    Export(export_command::ExportArgs),
+    Export(export::ExportArgs),
     /// Show what a recording contains
     Info(info::InfoArgs),
     /// Play a recording on the services of a node
@@ -85,7 +83,7 @@ fn run(command: &Command) -> anyhow::Result<Exit> {
     match command {
         Command::Check(args) => check::run(args),
         Command::Diff(args) => diff::run(args),
-        Command::Export(args) => export_command::run(args),
+        Command::Export(args) => export::run(args),
         Command::Info(args) => info::run(args),
         Command::Play(args) => play::run(args),
         Command::Record(args) => record::run(args),

@@ -1,11 +1,22 @@
 //! `recorder export`: turns a recording into files of other programs.
 
 mod data;
+mod files;
 mod format_args;
+mod foxglove;
+mod npz;
+mod obj;
 mod pictures;
+mod ros2;
+mod selection;
+mod shapes;
+mod snapshots;
 mod survey;
+mod tables;
 #[cfg(test)]
 mod tests;
+mod usda;
+mod vtk;
 
 use std::io::{BufReader, Read};
 use std::ops::ControlFlow;
@@ -25,13 +36,12 @@ use crate::cli::args::{OverwriteArgs, refuse_own_input};
 use crate::cli::damaged_input::{intact_parts, lacks};
 use crate::cli::output::{self, AsJson, Exit, progress_bar, progress_bytes};
 use crate::cli::parse::{self, whole_number_in};
-use crate::export::frame_names::FrameNames;
-use crate::export::pictures::target::Target;
-use crate::export::selection::{Choice, Moment, Selection, SnapshotRange};
-use crate::export::snapshots::{OpenBytes, Snapshots};
 use data::DataFormat;
+use files::{FrameNames, Target};
 use format_args::{Format, FormatArgs};
 use pictures::Pace;
+use selection::{Choice, Moment, Selection, SnapshotRange};
+use snapshots::{OpenBytes, Snapshots};
 use survey::Survey;
 
 /// Number of pictures without an option that selects them.

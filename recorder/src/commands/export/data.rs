@@ -6,10 +6,10 @@ use std::path::Path;
 use recording::{Existing, counted};
 use serde::Serialize;
 
+use super::files::WrittenFiles;
+use super::snapshots::Snapshots;
+use super::{foxglove, npz, obj, ros2, tables, usda, vtk};
 use crate::cli::output;
-use crate::export::data::written_files::WrittenFiles;
-use crate::export::data::{csv, energy, foxglove, npz, obj, pc2, ros2, usda, vtk};
-use crate::export::snapshots::Snapshots;
 
 /// A format of numbers or meshes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -91,11 +91,15 @@ fn write_files(
 ) -> anyhow::Result<()> {
     match format {
         DataFormat::Npz => files.add_streamed(target, |out| npz::write(snapshots, out)),
-        DataFormat::Csv => files.add_streamed(target, |out| csv::write(snapshots, out)),
-        DataFormat::Energy => files.add_streamed(target, |out| energy::write(snapshots, out)),
+        DataFormat::Csv => {
+            files.add_streamed(target, |out| tables::write_particles(snapshots, out))
+        }
+        DataFormat::Energy => {
+            files.add_streamed(target, |out| tables::write_energy(snapshots, out))
+        }
         DataFormat::Vtk => vtk::write(snapshots, target, files),
         DataFormat::Obj => obj::write(snapshots, target, files),
-        DataFormat::Pc2 => pc2::write(snapshots, target, files),
+        DataFormat::Pc2 => obj::write_cache(snapshots, target, files),
         DataFormat::Usda => files.add_streamed(target, |out| usda::write(snapshots, out)),
         DataFormat::Foxglove => files.add_streamed(target, |out| foxglove::write(snapshots, out)),
         DataFormat::Ros2 => ros2::write(snapshots, target, files),

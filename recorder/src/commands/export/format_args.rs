@@ -3,8 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::data::DataFormat;
-use crate::export::data::written_files::is_stdout;
-use crate::export::pictures::target::PictureFormat;
+use super::files::{PictureFormat, is_stdout};
 
 /// The formats. One of them is required.
 #[derive(Debug, clap::Args)]

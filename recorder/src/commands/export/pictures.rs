@@ -1,18 +1,20 @@
 //! Exports states as pictures.
 
+use std::io::Write;
 use std::path::Path;
 use std::time::Duration;
 
+use anyhow::{Context, bail};
 use recording::Existing;
-use recording::pictures::{ExtentTracker, PictureOptions, Renderer, View};
+use recording::pictures::{
+    ExtentTracker, Picture, PictureOptions, Renderer, Size, View, rasterize,
+};
 use serde::Serialize;
 
 use super::data::Written;
+use super::files::{Target, WrittenFiles};
+use super::snapshots::Snapshots;
 use crate::cli::output;
-use crate::export::data::written_files::WrittenFiles;
-use crate::export::pictures::apng::Animation;
-use crate::export::pictures::target::Target;
-use crate::export::snapshots::Snapshots;
 
 /// The times of the frames of an animation.
 #[derive(Debug, Clone, Copy)]
@@ -98,4 +100,124 @@ pub(super) fn renderer(
     let options = PictureOptions { view, ..options };
     let name = snapshots.run.scene_name.clone();
     Ok(Renderer::new(options, tracker.extent(), snapshots.up, name))
+}
+
+/// Most frames of an animation. A higher number is probably a mistake.
+const FRAMES_MAX: usize = 10_000;
+
+/// The unit of the times in the file.
+const MILLISECONDS_PER_S: u16 = 1000;
+
+/// Bytes of a pixel: red, green and blue. No pixel of a picture is transparent.
+const PIXEL_BYTES: usize = 3;
+
+/// Colors are rounded to multiples of this. Nobody sees it, and it halves the file.
+const COLOR_STEP: u8 = 8;
+
+/// An animation that is being written. It repeats forever.
+pub(crate) struct Animation<'a> {
+    writer: png::Writer<&'a mut dyn Write>,
+    size: Size,
+    /// Pixels of the frame before; empty before the first one.
+    shown: Vec<u8>,
+    /// Times of the next frames, in milliseconds.
+    delays_ms: std::vec::IntoIter<u16>,
+}
+
+impl<'a> Animation<'a> {
+    /// Begins an animation whose frames are shown for these times.
+    pub(crate) fn begin(
+        out: &'a mut dyn Write,
+        size: Size,
+        delays: &[Duration],
+    ) -> anyhow::Result<Self> {
+        let frame_count = delays.len();
+        if frame_count > FRAMES_MAX {
+            bail!(
+                "the options select {frame_count} snapshots, one frame each (allowed: up to \
+                 {FRAMES_MAX}). Select fewer, such as with --to or --every"
+            );
+        }
+        let frame_count = u32::try_from(frame_count).context("too many frames")?;
+        let mut encoder = png::Encoder::new(out, size.width, size.height);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_depth(png::BitDepth::Eight);
+        encoder.set_compression(png::Compression::High);
+        encoder.set_animated(frame_count, 0)?;
+        let delays_ms = whole_milliseconds(delays).into_iter();
+        Ok(Self { writer: encoder.write_header()?, size, shown: Vec::new(), delays_ms })
+    }
+
+    /// Adds a frame. Only the rectangle that changes is written, which makes most files several times
+    /// smaller.
+    pub(crate) fn add(&mut self, picture: &Picture) -> anyhow::Result<()> {
+        let rgb: Vec<u8> = rasterize(picture)?.into_iter().map(rounded).collect();
+        let changed = self.changed(&rgb);
+        let delay_ms = self.delays_ms.next().context("more frames than times")?;
+        self.writer.set_frame_delay(delay_ms, MILLISECONDS_PER_S)?;
+        self.writer.reset_frame_position()?;
+        self.writer.set_frame_dimension(changed.width, changed.height)?;
+        self.writer.set_frame_position(changed.x, changed.y)?;
+        self.writer.write_image_data(&changed.cut_out(&rgb, self.size))?;
+        self.shown = rgb;
+        Ok(())
+    }
+
+    /// Returns the smallest rectangle that contains every pixel that changes: all of them in the first
+    /// frame, and one, because a frame has at least one, if nothing changes.
+    fn changed(&self, rgb: &[u8]) -> Rectangle {
+        let Size { width, height } = self.size;
+        if self.shown.is_empty() {
+            return Rectangle { x: 0, y: 0, width, height };
+        }
+        let [mut left, mut top, mut right, mut bottom] = [width - 1, height - 1, 0, 0];
+        let pixels = rgb.chunks_exact(PIXEL_BYTES).zip(self.shown.chunks_exact(PIXEL_BYTES));
+        for (index, _) in (0_u32..).zip(pixels).filter(|(_, (new, old))| new != old) {
+            let (x, y) = (index % width, index / width);
+            (left, right) = (left.min(x), right.max(x));
+            (top, bottom) = (top.min(y), bottom.max(y));
+        }
+        if left > right {
+            return Rectangle { x: 0, y: 0, width: 1, height: 1 };
+        }
+        Rectangle { x: left, y: top, width: right - left + 1, height: bottom - top + 1 }
+    }
+
+    pub(crate) fn finish(self) -> anyhow::Result<()> {
+        Ok(self.writer.finish()?)
+    }
+}
+
+fn rounded(color: u8) -> u8 {
+    (color.saturating_add(COLOR_STEP / 2) / COLOR_STEP).saturating_mul(COLOR_STEP)
+}
+
+/// A part of a picture, in pixels. x points right, y down.
+struct Rectangle {
+    x: u32,
+    y: u32,
+    width: u32,
+    height: u32,
+}
+
+impl Rectangle {
+    /// Returns the pixels of this part of a picture.
+    fn cut_out(&self, rgb: &[u8], size: Size) -> Vec<u8> {
+        let row_bytes = size.width as usize * PIXEL_BYTES;
+        let (start, length) = (self.x as usize * PIXEL_BYTES, self.width as usize * PIXEL_BYTES);
+        let rows = rgb.chunks_exact(row_bytes).skip(self.y as usize).take(self.height as usize);
+        rows.flat_map(|row| &row[start..start + length]).copied().collect()
+    }
+}
+
+/// Rounds the ends of the frames to milliseconds, so that the errors do not add up. A frame is shown for at
+/// most 65 s, which the format can state.
+fn whole_milliseconds(delays: &[Duration]) -> Vec<u16> {
+    let (mut end, mut end_ms) = (Duration::ZERO, 0);
+    let delay_ms = |delay: &Duration| {
+        end += *delay;
+        let before_ms = std::mem::replace(&mut end_ms, (end.as_nanos() + 500_000) / 1_000_000);
+        u16::try_from(end_ms - before_ms).unwrap_or(u16::MAX)
+    };
+    delays.iter().map(delay_ms).collect()
 }

@@ -10,7 +10,7 @@ use recording::{
 use sim_solver::Scene;
 use sim_solver::scene::Up;
 
-use crate::export::snapshots::{OpenBytes, Snapshots, VisitStates};
+use super::snapshots::{OpenBytes, Snapshots, VisitStates};
 
 /// Most snapshots of a recording to export: 19 hours at 240 Hz. Their steps take 128 MiB of memory.
 const SNAPSHOTS_MAX: usize = 1 << 24;

@@ -12,7 +12,7 @@ use zip::ZipArchive;
 
 use super::super::data;
 use super::*;
-use crate::export::data::{csv, foxglove, npz, usda};
+use crate::commands::export::{foxglove, npz, tables, usda};
 
 /// A rope of three particles that are connected, and one that is not.
 const ROPE: &str = r#"
@@ -108,7 +108,7 @@ fn arrays_of_forces_with_another_number_of_rows_are_refused() {
 #[test]
 fn the_digits_of_a_table_give_the_bits_of_the_recording() {
     let file = record(ROPE, 5);
-    let table = String::from_utf8(written(&file, csv::write)).unwrap();
+    let table = String::from_utf8(written(&file, tables::write_particles)).unwrap();
     let rows = table.lines().skip(1).map(|line| {
         let cells: Vec<_> = line.split(',').collect();
         let number = |column: usize| cells[column].parse::<f32>().unwrap();
@@ -526,7 +526,7 @@ fn a_changing_number_of_particles_is_refused() {
     let file = record(ROPE, 1);
     let error = with_snapshots(&file, None, |snapshots| {
         let snapshots = Snapshots { particle_count: 3, ..*snapshots };
-        csv::write(&snapshots, &mut Vec::new()).unwrap_err()
+        tables::write_particles(&snapshots, &mut Vec::new()).unwrap_err()
     });
     let expected = "the snapshot of step 0 has 4 particles, but the first one 3";
     assert_eq!(error.to_string(), expected);

@@ -1,8 +1,4 @@
 //! A bag of ROS 2: an MCAP file with `PointCloud2` messages, commands and forces as JSON, and the static transform
-//! that turns the scene's `up` to z, and the metadata that `ros2 bag` reads.
-
-mod cdr;
-mod schemas;
 
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -14,11 +10,8 @@ use mcap::{WriteOptions, Writer};
 use recording::{MAP_FRAME, WORLD_FRAME, map_from_world};
 use sim_contract::ParticleState;
 
-use super::written_files::WrittenFiles;
-use crate::export::frame_names::FrameNames;
-use crate::export::snapshots::{Snapshots, new_outcomes};
-use cdr::CdrMessage;
-use schemas::{MessageType, POINT_CLOUD, STRING, TRANSFORMS};
+use super::files::{FrameNames, WrittenFiles};
+use super::snapshots::{Snapshots, new_outcomes};
 
 const PARTICLES_TOPIC: &str = "/particles";
 const TRANSFORM_TOPIC: &str = "/tf_static";
@@ -205,4 +198,160 @@ fn metadata(snapshots: &Snapshots<'_>, rows: RowCounts, file_name: &str) -> Stri
          - path: \"{file_name}\"\n      starting_time:\n        nanoseconds_since_epoch: {start_ns}\n      \
          duration:\n        nanoseconds: {duration_ns}\n      message_count: {count}\n"
     )
+}
+
+/// Identifies little-endian CDR. Alignment counts from its end.
+const ENCAPSULATION: [u8; 4] = [0, 1, 0, 0];
+
+/// A message that is being encoded.
+pub(super) struct CdrMessage(Vec<u8>);
+
+impl CdrMessage {
+    pub(super) fn new() -> Self {
+        Self(ENCAPSULATION.to_vec())
+    }
+
+    pub(super) fn add_u8(&mut self, number: u8) {
+        self.0.push(number);
+    }
+
+    pub(super) fn add_u32(&mut self, number: u32) {
+        self.add_aligned(number.to_le_bytes());
+    }
+
+    pub(super) fn add_f64(&mut self, number: f64) {
+        self.add_aligned(number.to_le_bytes());
+    }
+
+    /// Adds a text with its length and the zero at its end.
+    pub(super) fn add_text(&mut self, text: &str) {
+        self.add_count(text.len() + 1);
+        self.0.extend_from_slice(text.as_bytes());
+        self.0.push(0);
+    }
+
+    /// Adds a list of bytes with its length.
+    pub(super) fn add_bytes(&mut self, bytes: &[u8]) {
+        self.add_count(bytes.len());
+        self.0.extend_from_slice(bytes);
+    }
+
+    /// Adds the number of elements of a list. A payload of 2^24 particles has 2^29 bytes.
+    pub(super) fn add_count(&mut self, count: usize) {
+        self.add_u32(u32::try_from(count).unwrap_or(u32::MAX));
+    }
+
+    pub(super) fn finish(self) -> Vec<u8> {
+        self.0
+    }
+
+    fn add_aligned<const N: usize>(&mut self, bytes: [u8; N]) {
+        let content_size_bytes = self.0.len() - ENCAPSULATION.len();
+        let size_bytes = content_size_bytes.next_multiple_of(N) + ENCAPSULATION.len();
+        self.0.resize(size_bytes, 0);
+        self.0.extend_from_slice(&bytes);
+    }
+}
+
+/// Name and definition of a message.
+pub(super) struct MessageType {
+    pub(super) name: &'static str,
+    pub(super) definition: &'static str,
+}
+
+pub(super) const POINT_CLOUD: MessageType = MessageType {
+    name: "sensor_msgs/msg/PointCloud2",
+    definition: "\
+std_msgs/Header header
+uint32 height
+uint32 width
+sensor_msgs/PointField[] fields
+bool is_bigendian
+uint32 point_step
+uint32 row_step
+uint8[] data
+bool is_dense
+================================================================================
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+================================================================================
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+================================================================================
+MSG: sensor_msgs/PointField
+uint8 INT8=1
+uint8 UINT8=2
+uint8 INT16=3
+uint8 UINT16=4
+uint8 INT32=5
+uint8 UINT32=6
+uint8 FLOAT32=7
+uint8 FLOAT64=8
+string name
+uint32 offset
+uint8 datatype
+uint32 count
+",
+};
+
+pub(super) const STRING: MessageType =
+    MessageType { name: "std_msgs/msg/String", definition: "string data\n" };
+
+pub(super) const TRANSFORMS: MessageType = MessageType {
+    name: "tf2_msgs/msg/TFMessage",
+    definition: "\
+geometry_msgs/TransformStamped[] transforms
+================================================================================
+MSG: geometry_msgs/TransformStamped
+std_msgs/Header header
+string child_frame_id
+geometry_msgs/Transform transform
+================================================================================
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+================================================================================
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+================================================================================
+MSG: geometry_msgs/Transform
+geometry_msgs/Vector3 translation
+geometry_msgs/Quaternion rotation
+================================================================================
+MSG: geometry_msgs/Vector3
+float64 x
+float64 y
+float64 z
+================================================================================
+MSG: geometry_msgs/Quaternion
+float64 x
+float64 y
+float64 z
+float64 w
+",
+};
+
+#[cfg(test)]
+mod cdr_tests {
+    use super::*;
+
+    /// The example of a string before a number: padding follows it.
+    #[test]
+    fn numbers_are_aligned_to_their_size() {
+        let mut message = CdrMessage::new();
+        message.add_text("map");
+        message.add_u8(7);
+        message.add_u32(1);
+        message.add_f64(1.0);
+        let expected = [
+            &[0, 1, 0, 0][..],
+            &[4, 0, 0, 0, b'm', b'a', b'p', 0],
+            &[7, 0, 0, 0, 1, 0, 0, 0],
+            &1.0_f64.to_le_bytes(),
+        ];
+        assert_eq!(message.finish(), expected.concat());
+    }
 }

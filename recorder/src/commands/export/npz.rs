@@ -1,6 +1,4 @@
 //! NPZ, the archive of NumPy: one array per column, in a ZIP file without compression.
-//!
-//! An array is written from its first number to its last, so each column reads the recording once.
 
 use std::collections::BTreeSet;
 use std::io::Write;
@@ -11,7 +9,7 @@ use sim_contract::{ParticleState, PlainF32};
 use zip::write::{SimpleFileOptions, StreamWriter};
 use zip::{DateTime, ZipWriter};
 
-use crate::export::snapshots::{Snapshots, new_outcomes};
+use super::snapshots::{Snapshots, new_outcomes};
 
 /// The header of an array is padded to a multiple of this, so that its numbers are aligned.
 const HEADER_ALIGNMENT: usize = 64;
@@ -288,7 +286,7 @@ fn header(number_type: &str, shape: &[usize]) -> Vec<u8> {
 }
 
 #[cfg(test)]
-mod tests {
+mod npz_tests {
     use super::*;
 
     #[test]

@@ -1,8 +1,4 @@
 //! USD as text: one mesh or set of points whose positions and velocities are sampled at each frame, and a
-//! mesh for each collider.
-//!
-//! Time codes are steps, or frames of a frame rate, so every sample has an exact time. USD knows y up and z
-//! up. A scene with -y up gets half a turn about x instead, which leaves its coordinates unchanged.
 
 use std::fmt::{self, Display};
 use std::io::Write;
@@ -10,9 +6,8 @@ use std::io::Write;
 use sim_contract::ParticleState;
 use sim_solver::scene::Up;
 
-use super::colliders::{Colliders, Pose};
-use super::faces::{Face, Faces};
-use crate::export::snapshots::Snapshots;
+use super::shapes::{Colliders, Face, Faces, Pose};
+use super::snapshots::Snapshots;
 
 /// Writes the stage. The attributes of particles read the recording once each, because each lists all its samples.
 pub(crate) fn write(snapshots: &Snapshots<'_>, out: &mut dyn Write) -> anyhow::Result<()> {
@@ -351,7 +346,7 @@ impl Display for Matrix {
 }
 
 #[cfg(test)]
-mod tests {
+mod usda_tests {
     use glam::{DQuat, DVec3};
 
     use super::*;

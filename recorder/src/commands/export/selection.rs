@@ -151,7 +151,7 @@ fn nanoseconds(duration: Duration) -> u64 {
 }
 
 #[cfg(test)]
-mod tests {
+mod selection_tests {
     use super::*;
 
     const RATE_HZ: u32 = 100;

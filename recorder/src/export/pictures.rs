@@ -1,4 +1,0 @@
-//! Pictures as files.
-
-pub(crate) mod apng;
-pub(crate) mod target;
