@@ -1,18 +1,14 @@
 //! `recorder record`: records everything that a node publishes, into one file or into several.
 
-mod accepted;
 mod args;
-mod feed;
-mod first_state;
-mod intake;
-mod live;
-mod load;
-mod messages;
+mod batch;
 mod queue;
 mod report;
+mod session;
 mod split;
-mod stop_reason;
-mod writing;
+mod splitter;
+mod start;
+mod writer;
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -29,21 +25,19 @@ use sim_contract::{
 
 use crate::cli::output::{self, Exit};
 pub(crate) use args::{RecordArgs, SingleStateArgs};
-use feed::Feed;
-use feed::time_limit::TimeLimit;
-use feed::trigger::{Trigger, UserSignal};
-use intake::Intake;
-use live::LiveLine;
-use load::LoadError;
-use messages::Messages;
+use batch::{Messages, StopReason};
 use queue::Queue;
-use report::{Report, Written};
+use report::{LiveLine, Report, Written};
+use session::Session;
 use split::WritePosition;
-use stop_reason::StopReason;
-use writing::WriteOptions;
-use writing::black_box::BlackBox;
-use writing::extras::Extras;
-use writing::names::FileNames;
+use splitter::time_limit::TimeLimit;
+use splitter::trigger::{Trigger, UserSignal};
+use splitter::{SplitOptions, Splitter};
+use start::LoadError;
+use writer::WriteOptions;
+use writer::black_box::BlackBox;
+use writer::extras::Extras;
+use writer::names::FileNames;
 
 /// Longest wait for messages before the next check for signals.
 const WAIT_MAX: Duration = Duration::from_millis(50);
@@ -92,33 +86,24 @@ pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
         extras,
         black_box: args.black_box.map(|span| BlackBox::new(span, queue_bytes)),
     };
-    let mut file = Some(options.create(0)?);
-    let path = output::path_text(&options.names.path(0));
-    match args.black_box {
-        Some(span) => {
-            // That it can be created is known now. It is created with the first event.
-            file.take().map_or(Ok(()), PartFile::discard)?;
-            let span = humantime::format_duration(span);
-            output::note(&format!(
-                "ready keeping the last {span} of {endpoint}; the first file is {path}"
-            ));
-        }
-        None => output::note(&format!("ready recording {endpoint} into {path}")),
-    }
+    let file = first_file(args, &options, &endpoint)?;
 
     let queue = Arc::new(Queue::new(queue_bytes));
     let position = Arc::new(WritePosition::default());
-    let intake = Intake::new(args.steps).with_energy(selection.has_energy);
-    let writing = writing::start(Arc::clone(&queue), Arc::clone(&position), options, file)?;
+    let session = Session::new(args.steps).with_energy(selection.has_energy);
+    let writing = writer::start(Arc::clone(&queue), Arc::clone(&position), options, file)?;
     let live = LiveLine::new(Arc::clone(&queue), Arc::clone(&position), args.progress);
-    let feed = Feed::new(intake, Arc::clone(&queue), Arc::clone(&position), args.split.clone());
+    let options = SplitOptions {
+        split: args.split.clone(),
+        is_following: args.follows(),
+        selection,
+        time_limit: args.duration.map(|duration| TimeLimit::new(duration, monotonic_ns())),
+        trigger,
+        limit_bytes: args.queue_bytes,
+    };
     let mut recording = Recording {
         tap,
-        feed: feed
-            .following(args.follows())
-            .limited_to(args.duration.map(|duration| TimeLimit::new(duration, monotonic_ns())))
-            .selecting(selection)
-            .triggered_by(trigger, args.queue_bytes),
+        splitter: Splitter::new(session, Arc::clone(&queue), Arc::clone(&position), options),
         live,
         queue,
         position,
@@ -132,6 +117,25 @@ pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
     let report = recording.finish(result, args, &endpoint)?;
     output::result(args.as_json, &report, &report.to_string())?;
     Ok(if report.is_complete() { Exit::Done } else { Exit::Loss })
+}
+
+/// Creates the first file, and says that the recorder is ready. A black box creates it with the first event.
+fn first_file(
+    args: &RecordArgs,
+    options: &WriteOptions,
+    endpoint: &Endpoint,
+) -> anyhow::Result<Option<PartFile>> {
+    let file = options.create(0)?;
+    let path = output::path_text(&options.names.path(0));
+    let Some(span) = args.black_box else {
+        output::note(&format!("ready recording {endpoint} into {path}"));
+        return Ok(Some(file));
+    };
+    // That the file can be created is known now.
+    file.discard()?;
+    let span = humantime::format_duration(span);
+    output::note(&format!("ready keeping the last {span} of {endpoint}; the first file is {path}"));
+    Ok(None)
 }
 
 /// Returns the names of the files, and the files of a ring that it continues.
@@ -206,7 +210,7 @@ fn attach(args: &RecordArgs, endpoint: &Endpoint, stop: &Stop) -> anyhow::Result
 #[derive(Debug)]
 struct Recording {
     tap: Tap,
-    feed: Feed,
+    splitter: Splitter,
     live: LiveLine,
     queue: Arc<Queue>,
     position: Arc<WritePosition>,
@@ -233,7 +237,7 @@ impl Recording {
             if args.black_box.is_none() && self.signal.take() {
                 output::note(IGNORED_SIGNAL);
             }
-            if !self.live.update(&self.feed)? {
+            if !self.live.update(&self.splitter)? {
                 return Ok(StopReason::ReaderGone);
             }
             // In the lockstep, the node waits until the queue has room.
@@ -249,7 +253,7 @@ impl Recording {
         if now_ns >= self.next_owner_check_ns {
             self.next_owner_check_ns = now_ns + OWNER_CHECK_NS;
             self.is_owner_alive = self.tap.is_owner_alive();
-            self.ended_run = self.feed.run_id().filter(|_| !self.is_owner_alive);
+            self.ended_run = self.splitter.run_id().filter(|_| !self.is_owner_alive);
         }
         if stop.is_requested() {
             Some(StopReason::Signal)
@@ -257,7 +261,7 @@ impl Recording {
             Some(StopReason::WriteError)
         } else if self.position.ends_for_reserve() {
             Some(StopReason::Reserve)
-        } else if self.feed.is_time_over(now_ns) {
+        } else if self.splitter.is_time_over(now_ns) {
             Some(StopReason::Duration)
         } else {
             (!self.is_owner_alive).then_some(StopReason::OwnerGone)
@@ -266,21 +270,21 @@ impl Recording {
 
     /// Passes everything that has arrived to the queue. Returns the end of the recording, if it is
     /// reached.
-    fn read(&mut self) -> Result<Option<accepted::RunEnd>, LoadError> {
+    fn read(&mut self) -> Result<Option<batch::RunEnd>, LoadError> {
         let mut messages = Messages::default();
         // Bounded, so that a node that is faster than this loop cannot keep it from ending.
         for _ in 0..SNAPSHOTS_BUFFERED {
             let state = self.tap.next_state(|message| messages.add(message));
             let Some(state) = state else { break };
-            self.feed.accept_state(&state, &mut messages)?;
-            self.feed.count_unreadable(&self.tap.drain_errors());
-            if self.feed.is_at_end() {
+            self.splitter.accept_state(&state, &mut messages)?;
+            self.splitter.count_unreadable(&self.tap.drain_errors());
+            if self.splitter.is_at_end() {
                 break;
             }
         }
-        let end = self.feed.accept_messages(messages);
-        self.feed.set_lost(self.tap.lost_changes());
-        self.feed.count_unreadable(&self.tap.drain_errors());
+        let end = self.splitter.accept_messages(messages);
+        self.splitter.set_lost(self.tap.lost_changes());
+        self.splitter.count_unreadable(&self.tap.drain_errors());
         Ok(end)
     }
 
@@ -288,7 +292,7 @@ impl Recording {
     /// from the first. The file of a node that has started since the last check goes on.
     fn end_file_of_owner(&mut self) {
         let reason = StopReason::OwnerGone.text();
-        if self.ended_run.is_some_and(|run_id| self.feed.end_file_of(run_id, reason)) {
+        if self.ended_run.is_some_and(|run_id| self.splitter.end_file_of(run_id, reason)) {
             output::note("the node has ended; waiting for the next run");
         }
     }
@@ -305,18 +309,18 @@ impl Recording {
             Err(error) => format!("{error:#}"),
         };
         output::end_live();
-        self.feed.end_file(stop_reason.clone());
+        self.splitter.end_file(stop_reason.clone());
         self.queue.close();
         let mut written =
             self.writing.join().map_err(|_| anyhow!("the writing thread panicked"))??;
-        written.add_undeclared(&self.feed.undeclared());
+        written.add_undeclared(&self.splitter.undeclared());
         let reason = result?;
         if !args.follows()
             && let Some(hint) = reason.hint()
         {
             console::note(&format!("note: {hint}"));
         }
-        let report = Report::new(&written, self.feed.skipped_count(), stop_reason.clone());
+        let report = Report::new(&written, self.splitter.skipped_count(), stop_reason.clone());
         if !report.has_files() && args.black_box.is_none() {
             bail!("nothing was recorded ({stop_reason}): {}", cause_of_no_state(endpoint));
         }

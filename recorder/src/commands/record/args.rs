@@ -6,10 +6,10 @@ use std::time::Duration;
 
 use clap::error::ErrorKind;
 
-use super::feed::selector::SelectionArgs;
 use super::split::SplitArgs;
-use super::writing::extras::ExtraArgs;
-use super::writing::names::FileNames;
+use super::splitter::selector::SelectionArgs;
+use super::writer::extras::ExtraArgs;
+use super::writer::names::FileNames;
 use crate::cli::args::{EndpointArgs, FileArgs, default_path};
 use crate::cli::output::AsJson;
 use crate::cli::parse::{self, whole_number};

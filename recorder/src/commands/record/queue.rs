@@ -7,7 +7,7 @@ use std::time::Duration;
 use recording::{AllCounts, Backlog, Closing, Message, ParticleBuffer, StepRow, Topic};
 use sim_contract::Action;
 
-use super::load::RunHeader;
+use super::start::RunHeader;
 
 /// Bytes that wake the writing thread before its time: those of some chunks. Waking it for each snapshot takes
 /// longer than writing a small one, and waking it for each chunk takes a tenth of all processor time.

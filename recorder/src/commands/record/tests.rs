@@ -10,9 +10,9 @@ use recording::{
 };
 use sim_contract::{Action, Command, Outcome, ParticleState};
 
-use super::load::RunHeader;
 use super::queue::{Content, Entry, FileEnd, Item};
-use super::writing::write_item;
+use super::start::RunHeader;
+use super::writer::write_item;
 use super::*;
 
 const SEEDS: u64 = 20;

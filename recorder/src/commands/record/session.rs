@@ -1,6 +1,6 @@
 //! Selects the states and messages of a recording: its start, its end, and the missing messages.
 
-mod started;
+mod active_file;
 
 use recording::{AllCounts, Closing, EnergyRow, Topic};
 use sim_contract::{
@@ -8,11 +8,9 @@ use sim_contract::{
 };
 use sim_solver::EnergyMeter;
 
-use super::accepted::{Accepted, RunEnd};
-use super::first_state::FirstState;
-use super::load::{Load, LoadError, Now};
-use super::messages::Messages;
-use started::{Passed, PreviousFile, Started};
+use super::batch::{Batch, Messages, RunEnd};
+use super::start::{FirstState, Load, LoadError, Now};
+use active_file::{ActiveFile, Passed, PreviousFile};
 
 /// Most outcomes to keep before the first state. Beyond it the oldest are dropped.
 const OUTCOMES_PENDING_MAX: usize = 1 << 16;
@@ -20,7 +18,7 @@ const OUTCOMES_PENDING_MAX: usize = 1 << 16;
 /// Accepts a run from the first state that has its keyframe, in one file or in several that follow each
 /// other.
 #[derive(Debug, Default)]
-pub(crate) struct Intake {
+pub(crate) struct Session {
     /// Steps to record after the first one.
     steps_max: Option<u64>,
     /// The load of the newest state.
@@ -31,7 +29,7 @@ pub(crate) struct Intake {
     status: Option<NodeStatus>,
     /// Outcomes that may follow the first state.
     outcomes: Vec<Outcome>,
-    started: Option<Started>,
+    active: Option<ActiveFile>,
     /// The file before this one.
     previous: Option<PreviousFile>,
     /// The newest replayed run whose first snapshot has arrived.
@@ -78,7 +76,7 @@ pub(crate) struct Skipped {
     pub(crate) last_step: u64,
 }
 
-impl Intake {
+impl Session {
     /// Accepts up to `steps_max` steps after the first one.
     pub(crate) fn new(steps_max: Option<u64>) -> Self {
         Self { steps_max, ..Self::default() }
@@ -94,7 +92,7 @@ impl Intake {
         &mut self,
         state: &State<'_>,
         now: Now,
-        accepted: &mut Accepted,
+        batch: &mut Batch,
     ) -> Result<(), LoadError> {
         for change in state.changes {
             if let Change::Keyframe(header, bytes) = change
@@ -103,11 +101,11 @@ impl Intake {
                 candidate.add_keyframe(header, bytes);
             }
         }
-        self.start_if_ready(now, accepted);
-        if let Some(started) = &mut self.started {
+        self.start_if_ready(now, batch);
+        if let Some(active) = &mut self.active {
             let energy = measure(&mut self.meter, state);
             let particles = state.particles;
-            started.accept((state.header, energy), particles, state.changes, accepted);
+            active.accept((state.header, energy), particles, state.changes, batch);
             return Ok(());
         }
         if matches!(state.changes.first(), Some(Change::Load)) {
@@ -135,36 +133,31 @@ impl Intake {
         if self.previous.is_none() {
             (self.unreadable, self.follows_errors) = (0, true);
         }
-        self.start_if_ready(now, accepted);
+        self.start_if_ready(now, batch);
         Ok(())
     }
 
     /// Accepts the messages that have arrived between states.
-    pub(crate) fn accept_messages(
-        &mut self,
-        messages: Messages,
-        now: Now,
-        accepted: &mut Accepted,
-    ) {
+    pub(crate) fn accept_messages(&mut self, messages: Messages, now: Now, batch: &mut Batch) {
         if let Some(candidate) = &mut self.candidate {
             for (header, bytes) in &messages.keyframes {
                 candidate.add_keyframe(header, bytes);
             }
-            self.start_if_ready(now, accepted);
+            self.start_if_ready(now, batch);
         }
         self.outcomes.extend(messages.outcomes);
-        let Some(started) = &mut self.started else {
+        let Some(active) = &mut self.active else {
             let excess = self.outcomes.len().saturating_sub(OUTCOMES_PENDING_MAX);
             self.outcomes.drain(..excess);
             self.status = messages.statuses.last().copied().or(self.status);
             return;
         };
         // Those of later steps follow with their states.
-        let next_step = started.last().step + 1;
-        let is_due = |one: &mut Outcome| one.run_id != started.run_id || one.step <= next_step;
+        let next_step = active.last().step + 1;
+        let is_due = |one: &mut Outcome| one.run_id != active.run_id || one.step <= next_step;
         let due: Vec<_> = self.outcomes.extract_if(.., is_due).collect();
-        started.accept_outcomes(due.into_iter(), accepted);
-        started.accept_statuses(&messages.statuses, accepted);
+        active.accept_outcomes(due.into_iter(), batch);
+        active.accept_statuses(&messages.statuses, batch);
     }
 
     /// Returns the index of the first outcome that a file with this first state holds. Earlier ones are
@@ -190,12 +183,12 @@ impl Intake {
 
     /// Returns the reason why the file ends before a state.
     pub(crate) fn end_at(&self, header: &SnapshotHeader) -> Option<RunEnd> {
-        self.started.as_ref()?.end_at(header)
+        self.active.as_ref()?.end_at(header)
     }
 
     /// Returns `true` if a file has begun and not ended.
     pub(crate) fn has_started(&self) -> bool {
-        self.started.is_some()
+        self.active.is_some()
     }
 
     /// Accepts the last messages of a file that ends before `next`: those of earlier steps. The others
@@ -204,29 +197,29 @@ impl Intake {
         &mut self,
         next: &State<'_>,
         messages: &mut Messages,
-        accepted: &mut Accepted,
+        batch: &mut Batch,
     ) {
-        let Some(started) = &mut self.started else { return };
-        started.accept_changes_before(next, accepted);
+        let Some(active) = &mut self.active else { return };
+        active.accept_changes_before(next, batch);
         let header = next.header;
         let is_earlier = |run_id: u64, step: u64| run_id != header.run_id || step < header.step;
         self.outcomes.append(&mut messages.outcomes);
         let outcomes = self.outcomes.extract_if(.., |one| is_earlier(one.run_id, one.step));
-        started.accept_outcomes(outcomes, accepted);
+        active.accept_outcomes(outcomes, batch);
         let statuses: Vec<_> =
             messages.statuses.extract_if(.., |one| is_earlier(one.run_id, one.step)).collect();
-        started.accept_statuses(&statuses, accepted);
+        active.accept_statuses(&statuses, batch);
     }
 
     /// Marks all accepted snapshots as written.
     pub(crate) fn mark_written(&mut self) {
-        self.started.iter_mut().for_each(Started::mark_written);
+        self.active.iter_mut().for_each(ActiveFile::mark_written);
     }
 
     /// Accepts the outcomes of steps whose states do not follow in this file, at its end.
-    pub(crate) fn accept_rest(&mut self, accepted: &mut Accepted) {
-        if let Some(started) = &mut self.started {
-            started.accept_outcomes(self.outcomes.drain(..), accepted);
+    pub(crate) fn accept_rest(&mut self, batch: &mut Batch) {
+        if let Some(active) = &mut self.active {
+            active.accept_outcomes(self.outcomes.drain(..), batch);
         }
     }
 
@@ -234,37 +227,37 @@ impl Intake {
     /// with its keyframe begins another one.
     pub(crate) fn end_file(&mut self, stop_reason: String) -> Closing {
         let closing = self.closing(stop_reason);
-        if let Some(started) = self.started.take() {
+        if let Some(active) = self.active.take() {
             self.previous =
-                Some(started.into_previous(self.load.as_ref().map_or(0, Load::epoch_ns)));
+                Some(active.into_previous(self.load.as_ref().map_or(0, Load::epoch_ns)));
         }
         (self.candidate, self.unreadable) = (None, 0);
         closing
     }
 
     /// Starts the recording at the candidate, once it has its keyframe.
-    fn start_if_ready(&mut self, now: Now, accepted: &mut Accepted) {
+    fn start_if_ready(&mut self, now: Now, batch: &mut Batch) {
         let Some(first) = self.candidate.take_if(|first| first.has_keyframe()) else { return };
         let Some(load) = &mut self.load else { return };
         let previous = self.previous.as_ref();
-        let mut started = Started::new(&first, previous, self.lost);
-        started.add_gaps(self.skipped.count, 0);
+        let mut active = ActiveFile::new(&first, previous, self.lost);
+        active.add_gaps(self.skipped.count, 0);
         let Passed { states, outcomes } = std::mem::take(&mut self.passed);
         let ended = previous.filter(|previous| previous.run_id != first.header.run_id);
-        started.add_gaps(states, outcomes + ended.map_or(0, PreviousFile::passed_outcomes));
+        active.add_gaps(states, outcomes + ended.map_or(0, PreviousFile::passed_outcomes));
         self.skipped_count += self.skipped.count;
         if previous.is_none() {
-            started.set_steps_max(self.steps_max);
+            active.set_steps_max(self.steps_max);
         }
         let epoch_ns = previous.and_then(|previous| previous.epoch_ns_of(&first.header));
         load.set_epoch(&first.header, epoch_ns, now);
         let header = load.run_header(&first.header, first.torn_before);
-        started.count_load(&header.rows);
-        started.skip_member_changes(self.status.as_ref());
-        accepted.header = Some(header);
+        active.count_load(&header.rows);
+        active.skip_member_changes(self.status.as_ref());
+        batch.header = Some(header);
         let FirstState { header, energy, particles, changes, .. } = first;
-        started.accept((&header, energy), &particles, &changes, accepted);
-        self.started = Some(started);
+        active.accept((&header, energy), &particles, &changes, batch);
+        self.active = Some(active);
     }
 
     /// Counts messages that could not be read since the last call. Those that a tap read with the first
@@ -274,12 +267,12 @@ impl Intake {
     pub(crate) fn count_unreadable(&mut self, errors: &[ReadError]) -> Option<String> {
         let is_missing = !std::mem::take(&mut self.follows_errors);
         let has_begun =
-            self.candidate.is_some() || self.started.is_some() || self.previous.is_some();
+            self.candidate.is_some() || self.active.is_some() || self.previous.is_some();
         if is_missing && has_begun {
             self.unreadable += errors.len() as u64;
         }
         let error = errors.first()?;
-        let phase = self.started.is_some() && is_missing;
+        let phase = self.active.is_some() && is_missing;
         let is_first = self.reported.replace(phase) != Some(phase);
         let effect = if phase { "was not recorded" } else { "before the start could not be read" };
         is_first.then(|| format!("warning: a message {effect}: {error}"))
@@ -318,12 +311,12 @@ impl Intake {
 
     /// Returns the first step of the file, once it has begun.
     pub(crate) fn first_step(&self) -> Option<u64> {
-        self.started.as_ref().map(|started| started.first_step)
+        self.active.as_ref().map(|active| active.first_step)
     }
 
     /// Returns the last recorded state of the file, once it has begun.
     pub(crate) fn last(&self) -> Option<&SnapshotHeader> {
-        self.started.as_ref().map(Started::last)
+        self.active.as_ref().map(ActiveFile::last)
     }
 
     /// Returns the last step of the file so far, once it has begun.
@@ -333,7 +326,7 @@ impl Intake {
 
     /// Returns the run in the file, once it has begun.
     pub(crate) fn run_id(&self) -> Option<u64> {
-        self.started.as_ref().map(|started| started.run_id)
+        self.active.as_ref().map(|active| active.run_id)
     }
 
     /// Sets the numbers of changes that the tap has dropped so far.
@@ -347,7 +340,7 @@ impl Intake {
     }
 
     fn counts(&self) -> AllCounts {
-        self.started.as_ref().map_or_else(AllCounts::default, |started| started.counts(&self.lost))
+        self.active.as_ref().map_or_else(AllCounts::default, |active| active.counts(&self.lost))
     }
 }
 

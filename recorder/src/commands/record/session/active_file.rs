@@ -1,4 +1,4 @@
-//! The run in progress: the accepted states and messages, the end, and the missing messages.
+//! The active file: the accepted states and messages, its end, and the missing messages.
 
 use recording::simulation::{FrozenParticles, FrozenTracker};
 use recording::{
@@ -10,9 +10,9 @@ use sim_contract::{
     NodeStatus, Outcome, ParticleState, SnapshotFlags, SnapshotHeader, State,
 };
 
-use crate::commands::record::accepted::{Accepted, RunEnd};
-use crate::commands::record::first_state::FirstState;
+use crate::commands::record::batch::{Batch, RunEnd};
 use crate::commands::record::queue::Content;
+use crate::commands::record::start::FirstState;
 
 /// The end of a file that another one may follow.
 #[derive(Debug)]
@@ -85,7 +85,7 @@ impl PreviousFile {
 
 /// The run that is being recorded.
 #[derive(Debug)]
-pub(super) struct Started {
+pub(super) struct ActiveFile {
     pub(super) run_id: u64,
     topology_revision: u32,
     pub(super) first_step: u64,
@@ -120,7 +120,7 @@ pub(super) struct Started {
     counts: AllCounts,
 }
 
-impl Started {
+impl ActiveFile {
     /// Starts before a state, which comes next.
     pub(super) fn new(
         first: &FirstState,
@@ -189,7 +189,7 @@ impl Started {
 
     /// Accepts the changes between the last state and the first one of the next file. The changes in
     /// the step of that one are part of it, except its events.
-    pub(super) fn accept_changes_before(&mut self, next: &State<'_>, accepted: &mut Accepted) {
+    pub(super) fn accept_changes_before(&mut self, next: &State<'_>, batch: &mut Batch) {
         if next.header.run_id != self.run_id {
             return;
         }
@@ -201,19 +201,19 @@ impl Started {
             rows.extend(events.into_iter().map(Message::Event));
         }
         for message in rows {
-            self.push(message, accepted);
+            self.push(message, batch);
         }
     }
 
     /// Adds a row. One that describes a state whose snapshot is written has come too late, as over a tunnel, and counts as
     /// missing: the messages of a file are in the order of steps.
-    fn push(&mut self, message: Message, accepted: &mut Accepted) {
+    fn push(&mut self, message: Message, batch: &mut Batch) {
         let topic = message.topic();
         if topic.is_of_state() && self.written_step >= Some(message.step()) {
             self.counts[topic].gaps += 1;
         } else {
             self.counts[topic].received += 1;
-            accepted.push(message);
+            batch.push(message);
         }
     }
 
@@ -237,29 +237,29 @@ impl Started {
         (header, energy): (&SnapshotHeader, Option<EnergyRow>),
         particles: &[ParticleState],
         changes: &[Change],
-        accepted: &mut Accepted,
+        batch: &mut Batch,
     ) {
-        accepted.end = self.end_at(header);
-        if accepted.end.is_some() {
+        batch.end = self.end_at(header);
+        if batch.end.is_some() {
             return;
         }
         let rows = changes.iter().filter_map(|change| self.row(change));
         let rows: Vec<_> = rows.collect();
-        let mut buffer = std::mem::take(&mut accepted.spare);
+        let mut buffer = std::mem::take(&mut batch.spare);
         buffer.copy_from(particles);
         let frozen = FrozenParticles::find(buffer.particles());
         let events = self.frozen.new_events(header.step, frozen);
         for message in rows.into_iter().chain(events.into_iter().map(Message::Event)) {
-            self.push(message, accepted);
+            self.push(message, batch);
         }
         self.count_gaps(header);
         self.last = *header;
         self.counts[Topic::Steps].received += 1;
         self.counts[Topic::Particles].received += 1;
         let row = StepRow { energy, ..StepRow::from(header) };
-        accepted.contents.push(Content::Snapshot(row, buffer));
+        batch.contents.push(Content::Snapshot(row, buffer));
         if header.step >= self.end_step {
-            accepted.end = Some(RunEnd::EndStep);
+            batch.end = Some(RunEnd::EndStep);
         }
     }
 
@@ -349,10 +349,10 @@ impl Started {
     pub(super) fn accept_outcomes(
         &mut self,
         outcomes: impl Iterator<Item = Outcome>,
-        accepted: &mut Accepted,
+        batch: &mut Batch,
     ) {
         for outcome in outcomes {
-            let is_later = accepted.end.is_some() && outcome.index >= self.last.outcome_count
+            let is_later = batch.end.is_some() && outcome.index >= self.last.outcome_count
                 || outcome.step > self.end_step;
             let is_foreign = outcome.run_id != self.run_id || is_later;
             if is_foreign || outcome.index < self.next_outcome {
@@ -360,20 +360,20 @@ impl Started {
             }
             self.counts[Topic::Outcomes].gaps += outcome.index - self.next_outcome;
             self.next_outcome = outcome.index.saturating_add(1);
-            self.push(Message::Outcome(OutcomeRow::from(&outcome)), accepted);
+            self.push(Message::Outcome(OutcomeRow::from(&outcome)), batch);
         }
     }
 
-    pub(super) fn accept_statuses(&mut self, statuses: &[NodeStatus], accepted: &mut Accepted) {
+    pub(super) fn accept_statuses(&mut self, statuses: &[NodeStatus], batch: &mut Batch) {
         let steps = self.first_step..=self.end_step;
         for status in statuses {
             if status.run_id != self.run_id {
                 continue;
             }
-            self.accept_member_changes(status, accepted);
+            self.accept_member_changes(status, batch);
             if steps.contains(&status.step) {
                 self.counts[Topic::Status].received += 1;
-                accepted.push(Message::Status(StatusRow::from(status)));
+                batch.push(Message::Status(StatusRow::from(status)));
             }
         }
     }
@@ -387,7 +387,7 @@ impl Started {
 
     /// Accepts the changes of the members that no status before has named. Those between the file before
     /// and this one are in neither, and missing.
-    fn accept_member_changes(&mut self, status: &NodeStatus, accepted: &mut Accepted) {
+    fn accept_member_changes(&mut self, status: &NodeStatus, batch: &mut Batch) {
         let changes = &status.member_changes;
         let next = self.next_member_change.unwrap_or(changes.oldest());
         self.counts[Topic::Events].gaps += changes.oldest().saturating_sub(next);
@@ -398,7 +398,7 @@ impl Started {
         let steps = self.first_step..=self.end_step;
         for change in changes.iter_from(next).filter(|change| steps.contains(&change.step)) {
             self.counts[Topic::Events].received += 1;
-            accepted.push(Message::Event(EventRow::from(change)));
+            batch.push(Message::Event(EventRow::from(change)));
         }
     }
 

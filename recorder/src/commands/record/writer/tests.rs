@@ -49,13 +49,13 @@ pub(super) fn header() -> RunHeader {
 }
 
 /// A recording that keeps two files and has written two, `run_0000.mcap` and `run_0001.mcap`.
-fn full_ring(folder: &Folder) -> Files {
+fn full_ring(folder: &Folder) -> Writer {
     let mut files = ring(FileNames::numbered(folder.0.join("run.mcap")), Vec::new());
     write_files(&mut files, 2);
     files
 }
 
-fn write_files(files: &mut Files, count: usize) {
+fn write_files(files: &mut Writer, count: usize) {
     for _ in 0..count {
         files.begin(&header(), 0).unwrap();
         files.finish(closing()).unwrap();
@@ -63,7 +63,7 @@ fn write_files(files: &mut Files, count: usize) {
 }
 
 /// A recording that keeps two files.
-fn ring(names: FileNames, earlier: Vec<PathBuf>) -> Files {
+fn ring(names: FileNames, earlier: Vec<PathBuf>) -> Writer {
     let options = WriteOptions {
         file: Options::parse_from(["record"]).file,
         names,
@@ -75,7 +75,7 @@ fn ring(names: FileNames, earlier: Vec<PathBuf>) -> Files {
         flush_interval: Duration::from_secs(1),
         black_box: None,
     };
-    Files::new(options, Arc::default(), None)
+    Writer::new(options, Arc::default(), None)
 }
 
 fn closing() -> Closing {

@@ -18,10 +18,10 @@ use recording::{
 };
 use sim_contract::clock::monotonic_ns;
 
-use super::load::RunHeader;
 use super::queue::{Content, Entry, FileEnd, Item, Queue};
 use super::report::Written;
 use super::split::{Ring, WritePosition};
+use super::start::RunHeader;
 use crate::cli::args::{FileArgs, LogFile};
 use crate::cli::output;
 use black_box::{BlackBox, KeptFile};
@@ -75,7 +75,7 @@ pub(crate) fn start(
 ) -> anyhow::Result<JoinHandle<anyhow::Result<Written>>> {
     let queue = CloseOnDrop(queue);
     let writing = thread::Builder::new().name("writer".to_owned()).spawn(move || {
-        let mut files = Files::new(options, position, first);
+        let mut files = Writer::new(options, position, first);
         files.write_all(&queue.0)?;
         files.close()
     });
@@ -84,7 +84,7 @@ pub(crate) fn start(
 
 /// The files of a recording.
 #[derive(Debug)]
-struct Files {
+struct Writer {
     options: WriteOptions,
     position: Arc<WritePosition>,
     /// The first file, until it begins.
@@ -106,7 +106,7 @@ struct OpenFile {
     steps: Option<(u64, u64)>,
 }
 
-impl Files {
+impl Writer {
     fn new(
         mut options: WriteOptions,
         position: Arc<WritePosition>,

@@ -10,14 +10,11 @@ use recording::{AllCounts, Closing, ContentSelection, RunDescription, counted};
 use sim_contract::clock::{SECOND_NS, monotonic_ns, realtime_ns};
 use sim_contract::{LostChanges, ReadError, State, StatusFlags};
 
-use super::accepted::{Accepted, RunEnd};
-use super::first_state::FirstState;
-use super::intake::{Intake, Skipped};
-use super::load::{LoadError, Now};
-use super::messages::Messages;
+use super::batch::{Batch, Messages, RunEnd, StopReason};
 use super::queue::{Content, FileEnd, Item, Queue};
+use super::session::{Session, Skipped};
 use super::split::{FileBegin, SplitArgs, WritePosition};
-use super::stop_reason::StopReason;
+use super::start::{FirstState, LoadError, Now};
 use crate::cli::output;
 use selector::Selector;
 use time_limit::{FirstStep, TimeLimit};
@@ -26,71 +23,52 @@ use trigger::{PartEnd, Trigger};
 /// Shortest part of a black box. A part repeats the scene and the constraints.
 const PART_MIN_NS: u64 = SECOND_NS;
 
-/// Feeds the queue with the files of a recording.
+/// The division of a recording into files, and its end.
+#[derive(Debug, Default)]
+pub(crate) struct SplitOptions {
+    pub(crate) split: SplitArgs,
+    /// Another load and another run begin the next file.
+    pub(crate) is_following: bool,
+    pub(crate) selection: ContentSelection,
+    pub(crate) time_limit: Option<TimeLimit>,
+    /// Decides when the black box is written, if this is one.
+    pub(crate) trigger: Option<Trigger>,
+    /// Memory of the black box.
+    pub(crate) limit_bytes: u64,
+}
+
+/// Divides the states of a session into the files of a recording, and passes them to the queue.
 #[derive(Debug)]
-pub(crate) struct Feed {
-    intake: Intake,
+pub(crate) struct Splitter {
+    session: Session,
     queue: Arc<Queue>,
     position: Arc<WritePosition>,
-    split: SplitArgs,
-    /// Another load and another run begin the next file.
-    is_following: bool,
+    options: SplitOptions,
     selector: Selector,
-    time_limit: Option<TimeLimit>,
-    /// Decides when the black box is written, if this is one.
-    trigger: Option<Trigger>,
-    /// Memory of the black box.
-    limit_bytes: u64,
     is_paused: bool,
     /// The newest file.
     file: Option<FileBegin>,
     /// Contents of the newest file that are not in the queue yet.
-    accepted: Accepted,
+    batch: Batch,
 }
 
-impl Feed {
+impl Splitter {
     pub(crate) fn new(
-        intake: Intake,
+        session: Session,
         queue: Arc<Queue>,
         position: Arc<WritePosition>,
-        split: SplitArgs,
+        options: SplitOptions,
     ) -> Self {
-        let accepted = Accepted::default();
-        let selector = Selector::new(ContentSelection::default());
         Self {
-            intake,
+            session,
             queue,
             position,
-            split,
-            is_following: false,
-            selector,
-            time_limit: None,
-            trigger: None,
-            limit_bytes: u64::MAX,
+            selector: Selector::new(options.selection),
+            options,
             is_paused: false,
             file: None,
-            accepted,
+            batch: Batch::default(),
         }
-    }
-
-    /// Feeds a black box that keeps `limit_bytes`.
-    pub(crate) fn triggered_by(self, trigger: Option<Trigger>, limit_bytes: u64) -> Self {
-        Self { trigger, limit_bytes, ..self }
-    }
-
-    /// Goes on in the next file with another load or run.
-    pub(crate) fn following(self, is_following: bool) -> Self {
-        Self { is_following, ..self }
-    }
-
-    /// Ends after a time.
-    pub(crate) fn limited_to(self, time_limit: Option<TimeLimit>) -> Self {
-        Self { time_limit, ..self }
-    }
-
-    /// Leaves out what is not selected.
-    pub(crate) fn selecting(self, selection: ContentSelection) -> Self {
-        Self { selector: Selector::new(selection), ..self }
     }
 
     /// Accepts a state, in the next file if this one ends before it. `messages` have arrived before it.
@@ -100,47 +78,49 @@ impl Feed {
         messages: &mut Messages,
     ) -> Result<(), LoadError> {
         if let Some(reason) = self.end_before(state) {
-            self.intake.accept_before(state, messages, &mut self.accepted);
+            self.session.accept_before(state, messages, &mut self.batch);
             let is_split = reason == StopReason::Split;
             let end = if is_split { PartEnd::Continued } else { PartEnd::Last };
             self.end_part(reason.text().to_owned(), end);
         }
-        self.accepted.spare = self.queue.take_spare();
+        self.batch.spare = self.queue.take_spare();
         self.delay_file();
-        self.intake.accept_state(state, Now::read(), &mut self.accepted)
+        self.session.accept_state(state, Now::read(), &mut self.batch)
     }
 
     /// Delays the next file while the disk stalls, so that the starts of files do not fill the memory.
     fn delay_file(&mut self) {
-        let is_delayed = !self.intake.has_started() && !self.queue.has_room();
-        if is_delayed && !self.intake.is_delayed() {
+        let is_delayed = !self.session.has_started() && !self.queue.has_room();
+        if is_delayed && !self.session.is_delayed() {
             output::note(
                 "warning: the disk does not keep up, and --queue-bytes of messages wait for it; the next file begins \
                  when it has caught up, and declares the snapshots before it as missing",
             );
         }
-        self.intake.delay(is_delayed);
+        self.session.delay(is_delayed);
     }
 
     /// Returns the reason why another file begins with a state.
     fn end_before(&self, state: &State<'_>) -> Option<StopReason> {
-        match self.intake.end_at(state.header) {
+        match self.session.end_at(state.header) {
             Some(RunEnd::EndStep) => None,
-            Some(end) => self.is_following.then_some(StopReason::Run(end)),
+            Some(end) => self.options.is_following.then_some(StopReason::Run(end)),
             None => self.is_split_before(state).then_some(StopReason::Split),
         }
     }
 
     fn is_split_before(&self, state: &State<'_>) -> bool {
-        let Some(file) = self.file.filter(|_| self.intake.has_started()) else { return false };
+        let Some(file) = self.file.filter(|_| self.session.has_started()) else { return false };
         let now_ns = monotonic_ns();
-        let is_due = match &self.trigger {
+        let is_due = match &self.options.trigger {
             Some(trigger) => {
                 now_ns.saturating_sub(file.monotonic_ns) >= PART_MIN_NS
                     || trigger.is_due(now_ns)
-                    || trigger.has_shown_event(self.intake.last_step()) && self.is_full(1)
+                    || trigger.has_shown_event(self.session.last_step()) && self.is_full(1)
             }
-            None => self.split.is_due(file, &self.position, self.queue.size_bytes(), now_ns),
+            None => {
+                self.options.split.is_due(file, &self.position, self.queue.size_bytes(), now_ns)
+            }
         };
         is_due && self.queue.has_room() && FirstState::is_complete(state)
     }
@@ -152,9 +132,9 @@ impl Feed {
         if let Some(status) = messages.statuses.last() {
             self.is_paused = status.flags & StatusFlags::PAUSED != 0;
         }
-        self.intake.accept_messages(messages, Now::read(), &mut self.accepted);
+        self.session.accept_messages(messages, Now::read(), &mut self.batch);
         let is_snapshot = |content: &Content| content.snapshot_step().is_some();
-        let has_snapshot = self.accepted.contents.iter().any(is_snapshot);
+        let has_snapshot = self.batch.contents.iter().any(is_snapshot);
         self.enqueue();
         if self.is_paused && !(was_paused && has_snapshot) {
             // No other snapshot comes during the pause, so the messages behind this snapshot must not
@@ -162,18 +142,18 @@ impl Feed {
             self.push_last_snapshot();
         }
         self.end_part_early();
-        self.accepted.end.take()
+        self.batch.end.take()
     }
 
     /// Returns `true` if the time of the recording is over.
     pub(crate) fn is_time_over(&self, now_ns: u64) -> bool {
-        let limit = self.time_limit.as_ref();
-        limit.is_some_and(|limit| limit.is_reached(self.intake.last(), now_ns))
+        let limit = self.options.time_limit.as_ref();
+        limit.is_some_and(|limit| limit.is_reached(self.session.last(), now_ns))
     }
 
     /// Returns `true` if the recording ends.
     pub(crate) fn is_at_end(&self) -> bool {
-        self.accepted.end.is_some()
+        self.batch.end.is_some()
     }
 
     /// Returns the number of the newest file, from 0.
@@ -183,7 +163,7 @@ impl Feed {
 
     /// Returns the run in the file, once one has begun.
     pub(crate) fn run_id(&self) -> Option<u64> {
-        self.intake.run_id()
+        self.session.run_id()
     }
 
     /// Ends the file if it belongs to this run. Returns `true` if it does.
@@ -197,18 +177,18 @@ impl Feed {
 
     /// Ends the file, if one has begun.
     pub(crate) fn end_file(&mut self, stop_reason: String) {
-        self.intake.accept_rest(&mut self.accepted);
+        self.session.accept_rest(&mut self.batch);
         self.end_part(stop_reason, PartEnd::Last);
     }
 
     /// Ends the file, or a part of a black box that the next one may continue.
     fn end_part(&mut self, stop_reason: String, end: PartEnd) {
         self.enqueue();
-        if !self.intake.has_started() {
+        if !self.session.has_started() {
             return;
         }
-        let (is_full, last_step) = (self.is_full(1), self.intake.last_step());
-        let (stop_reason, end) = match &mut self.trigger {
+        let (is_full, last_step) = (self.is_full(1), self.session.last_step());
+        let (stop_reason, end) = match &mut self.options.trigger {
             Some(trigger) => {
                 let is_full = is_full && trigger.has_shown_event(last_step);
                 let is_continued = end == PartEnd::Continued;
@@ -223,7 +203,7 @@ impl Feed {
             let queue = &self.queue;
             self.selector.push_waiting(&mut |item| queue.push(item));
         }
-        let mut closing = self.intake.end_file(stop_reason);
+        let mut closing = self.session.end_file(stop_reason);
         closing.counts.set_left_out(&self.selector.take_counts());
         self.queue.end(closing, end);
     }
@@ -233,8 +213,8 @@ impl Feed {
     /// begins with it.
     fn end_part_early(&mut self) {
         let now_ns = monotonic_ns();
-        let (is_far_too_full, last_step) = (self.is_full(2), self.intake.last_step());
-        let Some(trigger) = &mut self.trigger else { return };
+        let (is_far_too_full, last_step) = (self.is_full(2), self.session.last_step());
+        let Some(trigger) = &mut self.options.trigger else { return };
         trigger.poll_signal(now_ns);
         let is_over = trigger.has_shown_event(last_step) && is_far_too_full;
         if is_over || self.is_paused && trigger.is_due(now_ns) {
@@ -246,24 +226,24 @@ impl Feed {
     fn is_full(&self, multiple: u64) -> bool {
         let kept_bytes = self.position.get().map_or(0, |(_, size_bytes)| size_bytes);
         let size_bytes = kept_bytes + self.queue.size_bytes() as u64;
-        size_bytes > self.limit_bytes.saturating_mul(multiple)
+        size_bytes > self.options.limit_bytes.saturating_mul(multiple)
     }
 
     /// Passes what is accepted to the queue, in the order of publication.
     fn enqueue(&mut self) {
         let log_time_ns = realtime_ns();
-        self.accepted.sort();
-        if let Some(header) = self.accepted.header.take() {
+        self.batch.sort();
+        if let Some(header) = self.batch.header.take() {
             let number = self.file.map_or(0, |file| file.number + 1);
             self.file = Some(FileBegin { number, monotonic_ns: monotonic_ns() });
             self.begin_file(&header.run);
             self.warn_of_skipped();
             self.queue.begin(header, log_time_ns);
         }
-        self.intake.mark_written();
+        self.session.mark_written();
         let now_ns = monotonic_ns();
-        for content in self.accepted.contents.drain(..) {
-            if let Some(trigger) = &mut self.trigger {
+        for content in self.batch.contents.drain(..) {
+            if let Some(trigger) = &mut self.options.trigger {
                 trigger.watch(&content, now_ns);
             }
             let queue = &self.queue;
@@ -279,22 +259,22 @@ impl Feed {
 
     /// Begins the time of the recording with its first file, and reports the first step.
     fn begin_file(&mut self, run: &RunDescription) {
-        let Some(step) = self.intake.first_step() else { return };
-        let publish_monotonic_ns = self.intake.last().map(|header| header.publish_monotonic_ns);
+        let Some(step) = self.session.first_step() else { return };
+        let publish_monotonic_ns = self.session.last().map(|header| header.publish_monotonic_ns);
         if let (Some(limit), Some(publish_monotonic_ns)) =
-            (&mut self.time_limit, publish_monotonic_ns)
+            (&mut self.options.time_limit, publish_monotonic_ns)
         {
             let (run_id, rate_hz) = (run.run_id, run.rate_hz);
             let first = FirstStep { run_id, step, rate_hz, publish_monotonic_ns };
             limit.begin(first, monotonic_ns());
         }
-        if self.trigger.is_none() {
+        if self.options.trigger.is_none() {
             output::note(&format!("recording from step {step}"));
         }
     }
 
     fn warn_of_skipped(&mut self) {
-        let Skipped { count, last_step } = self.intake.take_skipped();
+        let Skipped { count, last_step } = self.session.take_skipped();
         if count > 0 {
             let snapshots = counted(count, "snapshot");
             output::note(&format!(
@@ -306,30 +286,30 @@ impl Feed {
 
     /// Returns the number of snapshots that came before the first keyframe of a file.
     pub(crate) fn skipped_count(&self) -> u64 {
-        self.intake.skipped_count()
+        self.session.skipped_count()
     }
 
     /// Returns the numbers of missing messages since the last file, which no file declares.
     pub(crate) fn undeclared(&self) -> AllCounts {
-        self.intake.undeclared()
+        self.session.undeclared()
     }
 
     /// Counts messages that could not be read.
     pub(crate) fn count_unreadable(&mut self, errors: &[ReadError]) {
-        if let Some(warning) = self.intake.count_unreadable(errors) {
+        if let Some(warning) = self.session.count_unreadable(errors) {
             output::note(&warning);
         }
     }
 
     /// Returns `true` if a black box is fed.
     pub(crate) fn is_of_black_box(&self) -> bool {
-        self.trigger.is_some()
+        self.options.trigger.is_some()
     }
 
     /// Returns the counts of the newest file so far, with what the queue has dropped.
     pub(crate) fn closing(&self) -> Closing {
-        let mut closing = if self.intake.has_started() {
-            self.intake.closing(String::new())
+        let mut closing = if self.session.has_started() {
+            self.session.closing(String::new())
         } else {
             Closing::default()
         };
@@ -339,6 +319,6 @@ impl Feed {
 
     /// Sets the numbers of changes that the tap has dropped so far.
     pub(crate) fn set_lost(&mut self, lost: LostChanges) {
-        self.intake.set_lost(lost);
+        self.session.set_lost(lost);
     }
 }

@@ -7,8 +7,8 @@ use recording::{Closing, Message, Topic};
 use sim_contract::clock::SECOND_NS;
 
 use crate::cli::output;
-use crate::commands::record::load::RunHeader;
 use crate::commands::record::queue::{Content, FileEnd, Item};
+use crate::commands::record::start::RunHeader;
 
 /// Parts that are kept in any case: the one in progress, and the one before it, so that there is always
 /// something before an event.
@@ -173,7 +173,7 @@ mod tests {
     use sim_contract::ParameterValues;
 
     use super::*;
-    use crate::commands::record::writing::tests::header;
+    use crate::commands::record::writer::tests::header;
 
     fn update(message: Message, second: u64) -> Item {
         Item { content: Content::Update(message), log_time_ns: second * SECOND_NS }
