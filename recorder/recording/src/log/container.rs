@@ -5,6 +5,7 @@
 pub(super) mod check;
 mod content;
 pub(super) mod finding;
+mod head;
 pub(super) mod losses;
 pub(super) mod lost_load;
 mod places;

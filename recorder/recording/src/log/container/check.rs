@@ -3,17 +3,16 @@
 use std::collections::BTreeSet;
 use std::io::{Read, Seek};
 
-use mcap::records::{Channel, Header, MessageHeader, Metadata, Record, op};
+use mcap::records::{Channel, MessageHeader, Record, op};
 use sim_contract::Stop;
 
 use super::content::ContentCheck;
 use super::finding::{CheckExtent, CheckReport, Findings, after_end_text, record_name};
+use super::head::FileHead;
 use super::places::{Places, SummaryCheck, is_of_index};
-use crate::log::read_error::{LogEnd, ReadError};
-use crate::log::run::selection::{ContentSelection, SELECTION_METADATA};
-use crate::log::run::{CLOSING_METADATA, Closing, RUN_METADATA, SCENE_ATTACHMENT};
+use crate::log::read_error::ReadError;
 use crate::log::scanner::chunk::{Chunk, ChunkContent, InnerRecords};
-use crate::log::scanner::limits::{RECORD_HEADER_SIZE_BYTES, SizeLimits};
+use crate::log::scanner::limits::RECORD_HEADER_SIZE_BYTES;
 use crate::log::scanner::window::Window;
 use crate::log::scanner::{Checksum, LongAttachment, Part, RecordScanner, Section};
 use crate::log::topic::Topic;
@@ -47,9 +46,7 @@ pub fn check_file<R: Read + Seek>(
         }
         let Some(part) = scanner.next()? else { break };
         check.add(part, &mut chunks)?;
-        if let Some(limits) = check.new_limits.take() {
-            scanner.set_limits(limits);
-        }
+        check.head.pass_limits(&mut scanner);
     }
     check.finish(scanner.size_bytes())
 }
@@ -66,14 +63,9 @@ struct InFile {
 struct Check {
     findings: Findings,
     extent: CheckExtent,
-    header: Option<Header>,
-    scene_size_bytes: usize,
-    selection: ContentSelection,
-    content: Option<ContentCheck>,
+    head: FileHead,
+    has_header: bool,
     first_step: Option<u64>,
-    /// The limits of the scene, until the scanner has them.
-    new_limits: Option<SizeLimits>,
-    closing: Option<Closing>,
     places: Places,
     /// A part of the file is damaged, so its index and its counts differ from the rest.
     has_damage: bool,
@@ -98,7 +90,9 @@ impl Check {
                 self.end_message_indexes(byte, op::CHUNK);
                 self.add_chunk(byte, size_bytes, &chunk, chunks);
             }
-            Part::Skipped { opcode: op::CHUNK, .. } => return Err(self.no_run()),
+            Part::Skipped { opcode: op::CHUNK, .. } => {
+                return Err(self.head.no_run(&self.findings));
+            }
             Part::Skipped { byte, opcode } => {
                 self.not_checked(format!("the {} at byte {byte}", record_name(opcode)));
             }
@@ -116,7 +110,7 @@ impl Check {
                 let what = format!("{} bytes are damaged: {cause}", bytes.end - bytes.start);
                 self.findings.add(bytes.start, "damaged record", what);
                 self.mark_gap();
-                self.allow_scene(bytes.end - bytes.start);
+                self.head.add_damage(bytes.end - bytes.start);
             }
             Part::Truncated { byte } => {
                 self.findings.add(byte, "end of the file", "the file is truncated here");
@@ -146,18 +140,10 @@ impl Check {
         }
     }
 
-    /// Allows for a scene in a damaged part before the first message.
-    fn allow_scene(&mut self, size_bytes: u64) {
-        if self.content.is_none() {
-            let size_bytes = usize::try_from(size_bytes).unwrap_or(usize::MAX);
-            self.scene_size_bytes = size_bytes.min(sim_contract::SCENE_SIZE_BYTES_MAX);
-        }
-    }
-
     fn mark_gap(&mut self) {
         self.has_damage = true;
         self.places.end_chunk();
-        if let Some(content) = &mut self.content {
+        if let Some(content) = &mut self.head.content {
             content.mark_gap();
         }
     }
@@ -168,7 +154,7 @@ impl Check {
             Err(error) => {
                 self.findings.add(byte, record_name(opcode), error.to_string());
                 self.mark_gap();
-                self.allow_scene(body.len() as u64);
+                self.head.add_damage(body.len() as u64);
                 return Ok(());
             }
         };
@@ -196,23 +182,24 @@ impl Check {
         size_bytes: u64,
     ) -> Result<(), ReadError> {
         let result = match record {
-            Record::Header(header) if self.header.is_none() => {
-                self.header = Some(header.clone());
+            Record::Header(header) if !self.has_header => {
+                self.has_header = true;
+                self.head.library.clone_from(&header.library);
                 Ok(())
             }
             Record::Attachment { header, data, crc } => {
                 if *crc == 0 {
                     self.not_checked(no_checksum(&header.name));
                 }
-                if header.name == SCENE_ATTACHMENT && self.content.is_none() {
-                    self.scene_size_bytes = data.len();
+                if self.head.is_scene(&header.name) {
+                    self.head.add_scene(data.len());
                 }
                 self.places.add_attachment(byte, size_bytes, header, data.len() as u64);
                 Ok(())
             }
             Record::Metadata(metadata) => {
                 self.places.add_metadata(byte, size_bytes, &metadata.name);
-                self.add_metadata(metadata)?;
+                self.head.add_metadata(metadata)?;
                 Ok(())
             }
             // The chunk before it is damaged.
@@ -240,24 +227,6 @@ impl Check {
         Ok(())
     }
 
-    fn add_metadata(&mut self, metadata: &Metadata) -> Result<(), ReadError> {
-        if metadata.name == RUN_METADATA && self.content.is_none() {
-            self.begin_content(metadata)?;
-        } else if metadata.name == SELECTION_METADATA {
-            self.selection = ContentSelection::read(&metadata.metadata)?;
-        } else if metadata.name == CLOSING_METADATA {
-            self.closing = Some(Closing::from_map(&metadata.metadata));
-        }
-        Ok(())
-    }
-
-    fn begin_content(&mut self, run: &Metadata) -> Result<(), ReadError> {
-        let content = ContentCheck::new(&run.metadata, self.selection, self.scene_size_bytes)?;
-        self.new_limits = Some(*content.limits());
-        self.content = Some(content);
-        Ok(())
-    }
-
     fn add_schema(&mut self, id: u16) {
         self.places.schemas.insert(id);
         let count = u16::try_from(self.places.schemas.len()).unwrap_or(u16::MAX);
@@ -265,7 +234,7 @@ impl Check {
     }
 
     fn add_channel(&mut self, channel: &Channel) -> Result<(), String> {
-        let content = self.content.as_mut().ok_or("it stands before the metadata 'run'")?;
+        let content = self.head.content.as_mut().ok_or("it stands before the metadata 'run'")?;
         self.places.statistics.channel_count += u32::from(!content.is_declared(channel.id));
         content.add_channel(channel)
     }
@@ -290,15 +259,6 @@ impl Check {
             self.findings.add_index(byte, "chunk", "it has no checksum");
         }
         self.add_content(byte, content);
-    }
-
-    /// Returns the error of a file without a readable description of its run.
-    fn no_run(&self) -> ReadError {
-        let Some(first) = self.findings.list().first() else {
-            let library = self.header.as_ref().map_or("", |header| header.library.as_str());
-            return ReadError::Foreign { library: library.to_owned() };
-        };
-        ReadError::NoHeader(LogEnd::Damaged { byte: first.byte, cause: first.what.clone() })
     }
 
     fn add_content(&mut self, byte: u64, content: &[u8]) {
@@ -327,7 +287,7 @@ impl Check {
     fn add_message(&mut self, place: InFile, header: &MessageHeader, data: &[u8], offset: u64) {
         self.places.add_message(header, offset);
         self.extent.message_count += 1;
-        let Some(content) = &mut self.content else { return };
+        let Some(content) = &mut self.head.content else { return };
         let result = content.check(header, data);
         if !content.is_declared(header.channel_id) && !self.undeclared.insert(header.channel_id) {
             return;
@@ -370,8 +330,8 @@ impl Check {
     }
 
     fn finish(mut self, size_bytes: u64) -> Result<CheckReport, ReadError> {
-        let Some(mut content) = self.content.take() else {
-            return Err(self.no_run());
+        let Some(mut content) = self.head.content.take() else {
+            return Err(self.head.no_run(&self.findings));
         };
         if let Some(step) = content.take_row() {
             let what = format!("step {step}: the row in /steps has no snapshot after it");
@@ -396,7 +356,7 @@ impl Check {
     /// Compares the messages that are missing with those that the file declares.
     fn check_declared(&mut self, content: &ContentCheck, end: u64) {
         let found = content.gaps.counts();
-        let Some(closing) = &self.closing else {
+        let Some(closing) = &self.head.closing else {
             if self.findings.count() == 0 {
                 self.findings.add_index(
                     end,

@@ -15,17 +15,16 @@ use mcap::{Attachment, MAGIC};
 use sim_contract::Stop;
 
 use super::check::WRONG_CHECKSUM;
-use super::content::ContentCheck;
 use super::finding::{AfterEnd, Findings, RepairReport, record_name};
+use super::head::FileHead;
 use super::losses::{LOST_SCENE, LOST_SELECTION};
 use super::lost_load::LoadRows;
 use super::places::Places;
 use super::repair_writer::{Format, RepairWriter, size_in_memory};
-use crate::log::read_error::{LogEnd, ReadError};
-use crate::log::run::selection::{ContentSelection, SELECTION_METADATA};
-use crate::log::run::{CLOSING_METADATA, Closing, RUN_METADATA, SCENE_ATTACHMENT, header_library};
+use crate::log::read_error::ReadError;
+use crate::log::run::{CLOSING_METADATA, Closing, SCENE_ATTACHMENT, header_library};
 use crate::log::scanner::chunk::{Chunk, ChunkContent, InnerRecords};
-use crate::log::scanner::limits::{HEADER_RECORD_SIZE_BYTES_MAX, SizeLimits};
+use crate::log::scanner::limits::HEADER_RECORD_SIZE_BYTES_MAX;
 use crate::log::scanner::window::Window;
 use crate::log::scanner::{Checksum, LongAttachment, Part, RecordScanner};
 use crate::log::topic::Topic;
@@ -79,9 +78,7 @@ pub fn repair_file<R: Read + Seek, W: Write>(
             }
             Some(part) => repair.add(part, &mut chunks)?,
         }
-        if let Some(limits) = repair.new_limits.take() {
-            scanner.set_limits(limits);
-        }
+        repair.file_head.pass_limits(&mut scanner);
     }
     repair.finish()
 }
@@ -134,19 +131,16 @@ struct Repair<W: Write> {
     size_bytes: u64,
     findings: Findings,
     format: Format,
+    file_head: FileHead,
     scene: Option<Vec<u8>>,
-    scene_size_bytes: usize,
     /// The load to write if the input has lost it.
     load: Option<LoadRows>,
-    selection: ContentSelection,
-    content: Option<ContentCheck>,
     /// The messages of the last chunk, to compare its message indexes with.
     places: Places,
     /// Numbers of lost messages by channel, before any channel is declared.
     undeclared: BTreeMap<u16, u64>,
     /// Numbers of messages by channel, as the index of the file has them.
     indexed: Option<BTreeMap<u16, u64>>,
-    new_limits: Option<SizeLimits>,
     /// Attachments and metadata before the first chunk.
     head: Vec<Record<'static>>,
     head_size_bytes: u64,
@@ -155,7 +149,6 @@ struct Repair<W: Write> {
     /// The output, until it is created.
     out: Option<W>,
     writer: Option<RepairWriter<W>>,
-    closing: Option<Closing>,
     section: Section,
     has_wrong_checksum: bool,
     /// The checksum of the data is wrong, and no finding in them tells why.
@@ -170,21 +163,17 @@ impl<W: Write> Repair<W> {
             size_bytes,
             findings: Findings::default(),
             format: Format::default(),
+            file_head: FileHead::default(),
             scene: None,
-            scene_size_bytes: 0,
             load: None,
-            selection: ContentSelection::default(),
-            content: None,
             places: Places::default(),
             undeclared: BTreeMap::new(),
             indexed: None,
-            new_limits: None,
             head: Vec::new(),
             head_size_bytes: 0,
             is_head_damaged: false,
             out: Some(out),
             writer: None,
-            closing: None,
             section: Section::Data,
             has_wrong_checksum: false,
             is_unexplained: false,
@@ -207,7 +196,9 @@ impl<W: Write> Repair<W> {
             Part::Chunk { byte, size_bytes, chunk } => {
                 self.add_chunk(byte, size_bytes, &chunk, chunks)?;
             }
-            Part::Skipped { opcode: op::CHUNK, .. } => return Err(self.no_run().into()),
+            Part::Skipped { opcode: op::CHUNK, .. } => {
+                return Err(self.file_head.no_run(&self.findings).into());
+            }
             // The attachment is copied in pieces, the bytes are only counted.
             Part::LongAttachment { .. } | Part::AfterEnd { .. } => {}
             Part::Skipped { byte, opcode } => {
@@ -218,7 +209,7 @@ impl<W: Write> Repair<W> {
             Part::Damaged { bytes, cause } => {
                 let size_bytes = bytes.end - bytes.start;
                 let what = format!("{size_bytes} bytes are damaged: {cause}");
-                self.allow_scene(size_bytes);
+                self.file_head.add_damage(size_bytes);
                 self.lose(bytes.start, "damaged record", &what)?;
                 self.begin_damage();
             }
@@ -240,14 +231,6 @@ impl<W: Write> Repair<W> {
         }
     }
 
-    /// Allows for a scene in a damaged part before the first message.
-    fn allow_scene(&mut self, size_bytes: u64) {
-        if self.content.is_none() {
-            let size_bytes = usize::try_from(size_bytes).unwrap_or(usize::MAX);
-            self.scene_size_bytes = size_bytes.min(sim_contract::SCENE_SIZE_BYTES_MAX);
-        }
-    }
-
     /// Reports a part that is left out. The index is rewritten, so nothing of it is lost.
     fn lose(&mut self, byte: u64, record: &str, what: &str) -> Result<(), RepairError> {
         if self.section == Section::Index {
@@ -255,10 +238,10 @@ impl<W: Write> Repair<W> {
             return Ok(());
         }
         self.findings.add(byte, record, what);
-        if self.content.is_some() {
+        if self.file_head.content.is_some() {
             self.begin()?;
         }
-        match (&mut self.writer, &mut self.content) {
+        match (&mut self.writer, &mut self.file_head.content) {
             (Some(writer), Some(content)) => writer.mark_gap(content),
             _ => self.is_head_damaged = true,
         }
@@ -275,18 +258,18 @@ impl<W: Write> Repair<W> {
         let record = match mcap::parse_record(opcode, body) {
             Ok(record) => record,
             Err(error) => {
-                self.allow_scene(body.len() as u64);
+                self.file_head.add_damage(body.len() as u64);
                 return self.lose(byte, record_name(opcode), &error.to_string());
             }
         };
         match record {
             Record::DataEnd(_) | Record::Footer(_) => self.section = Section::Index,
-            Record::Header(header) => self.format.library = header.library,
+            Record::Header(header) => self.file_head.library = header.library,
             Record::MessageIndex(index) => self.add_message_index(byte, &index)?,
             Record::Metadata(metadata) => self.add_metadata(byte, metadata)?,
             Record::Attachment { header, data, crc } => {
-                if header.name == SCENE_ATTACHMENT && self.content.is_none() {
-                    self.scene_size_bytes = data.len();
+                if self.file_head.is_scene(&header.name) {
+                    self.file_head.add_scene(data.len());
                     self.scene = Some(data.to_vec());
                 }
                 let data = Cow::Owned(data.into_owned());
@@ -298,18 +281,10 @@ impl<W: Write> Repair<W> {
     }
 
     fn add_metadata(&mut self, byte: u64, metadata: Metadata) -> Result<(), RepairError> {
+        self.file_head.add_metadata(&metadata)?;
+        // The output has an end of its own.
         if metadata.name == CLOSING_METADATA {
-            self.closing = Some(Closing::from_map(&metadata.metadata));
             return Ok(());
-        }
-        if metadata.name == SELECTION_METADATA {
-            self.selection = ContentSelection::read(&metadata.metadata)?;
-        }
-        if metadata.name == RUN_METADATA && self.content.is_none() {
-            let run = &metadata.metadata;
-            let content = ContentCheck::new(run, self.selection, self.scene_size_bytes)?;
-            self.new_limits = Some(*content.limits());
-            self.content = Some(content);
         }
         self.add_head(byte, Record::Metadata(metadata))
     }
@@ -321,13 +296,13 @@ impl<W: Write> Repair<W> {
             return Ok(self.copy_head(&record)?);
         }
         let sum = self.head_size_bytes.saturating_add(size_in_memory(&record));
-        if self.content.is_none() && sum > HEAD_SIZE_BYTES_MAX {
+        if self.file_head.content.is_none() && sum > HEAD_SIZE_BYTES_MAX {
             let what = "the records before the metadata 'run' are too long";
             return self.lose(byte, record_name(record.opcode()), what);
         }
         self.head_size_bytes = sum;
         self.head.push(record);
-        if self.content.is_some() && sum > HEADER_RECORD_SIZE_BYTES_MAX {
+        if self.file_head.content.is_some() && sum > HEADER_RECORD_SIZE_BYTES_MAX {
             self.begin()?;
         }
         Ok(())
@@ -366,9 +341,9 @@ impl<W: Write> Repair<W> {
 
     /// Sets the header of the output: that of the recorder of the run. The one of the input has no checksum.
     fn restore_header(&mut self) {
-        let Some(content) = &self.content else { return };
+        let Some(content) = &self.file_head.content else { return };
         let own = header_library(&content.run().recorder_version);
-        let found = std::mem::take(&mut self.format.library);
+        let found = std::mem::take(&mut self.file_head.library);
         if !found.is_empty() && !found.starts_with(&own) {
             let what = format!("its library is '{found}', not that of '{}'", own.trim_end());
             self.findings.add_index(MAGIC.len() as u64, "header", what);
@@ -416,7 +391,7 @@ impl<W: Write> Repair<W> {
         checksum: Checksum,
     ) -> Result<(), RepairError> {
         let LongAttachment { byte, header, data, .. } = attachment;
-        if self.content.is_none() {
+        if self.file_head.content.is_none() {
             let what = "it is too long to stand before the metadata 'run'";
             return self.lose(byte, "attachment", what);
         }
@@ -448,14 +423,14 @@ impl<W: Write> Repair<W> {
         place: &str,
         record: &Record<'_>,
     ) -> Result<(), RepairError> {
-        if self.content.is_none() {
-            return Err(self.no_run().into());
+        if self.file_head.content.is_none() {
+            return Err(self.file_head.no_run(&self.findings).into());
         }
         self.begin()?;
         if matches!(record, Record::Message { .. }) {
             self.declare_lost_channels()?;
         }
-        let (Some(writer), Some(content)) = (&mut self.writer, &mut self.content) else {
+        let (Some(writer), Some(content)) = (&mut self.writer, &mut self.file_head.content) else {
             return Ok(());
         };
         let result = match record {
@@ -481,26 +456,17 @@ impl<W: Write> Repair<W> {
         Ok(())
     }
 
-    /// Returns the error of a file without a readable description of its run.
-    fn no_run(&self) -> ReadError {
-        match self.findings.list().first() {
-            None => ReadError::Foreign { library: self.format.library.clone() },
-            Some(first) => {
-                ReadError::NoHeader(LogEnd::Damaged { byte: first.byte, cause: first.what.clone() })
-            }
-        }
-    }
-
     fn finish(mut self) -> Result<RepairReport, RepairError> {
-        if self.content.is_none() {
-            return Err(self.no_run().into());
+        if self.file_head.content.is_none() {
+            return Err(self.file_head.no_run(&self.findings).into());
         }
         self.begin()?;
         if !self.undeclared.is_empty() {
             self.declare_lost_channels()?;
         }
-        let closing = self.closing.take().map(|closing| self.without_damage(closing));
-        let (Some(writer), Some(mut content)) = (self.writer.take(), self.content.take()) else {
+        let closing = self.file_head.closing.take().map(|closing| self.without_damage(closing));
+        let (Some(writer), Some(mut content)) = (self.writer.take(), self.file_head.content.take())
+        else {
             return Err(WriteError::Stopped.into());
         };
         let mut metadata = BTreeMap::from([
@@ -545,10 +511,10 @@ impl<W: Write> Repair<W> {
             _ => {}
         }
         let (channel_id, count) = (index.channel_id, index.records.len() as u64);
-        if self.content.is_some() {
+        if self.file_head.content.is_some() {
             self.begin()?;
         }
-        match (&mut self.writer, &self.content) {
+        match (&mut self.writer, &self.file_head.content) {
             (Some(writer), Some(content)) if content.has_channels() => {
                 writer.losses.add_indexed(content.topic(channel_id), count);
             }
@@ -561,7 +527,7 @@ impl<W: Write> Repair<W> {
     /// of what it had.
     fn declare_lost_channels(&mut self) -> Result<(), WriteError> {
         self.declare_channels()?;
-        let (Some(writer), Some(content)) = (&mut self.writer, &self.content) else {
+        let (Some(writer), Some(content)) = (&mut self.writer, &self.file_head.content) else {
             return Ok(());
         };
         for (channel_id, count) in std::mem::take(&mut self.undeclared) {
@@ -572,7 +538,7 @@ impl<W: Write> Repair<W> {
 
     /// Declares the channels as a recorder does, if none is declared.
     fn declare_channels(&mut self) -> Result<(), WriteError> {
-        let (Some(writer), Some(content)) = (&mut self.writer, &mut self.content) else {
+        let (Some(writer), Some(content)) = (&mut self.writer, &mut self.file_head.content) else {
             return Ok(());
         };
         if content.has_channels() {
@@ -585,7 +551,9 @@ impl<W: Write> Repair<W> {
     /// Removes the numbers of written messages that the index of the file contradicts, if a byte of the data is
     /// wrong: it may be theirs.
     fn without_damage(&self, mut closing: Closing) -> Closing {
-        let (Some(indexed), Some(content)) = (&self.indexed, &self.content) else { return closing };
+        let (Some(indexed), Some(content)) = (&self.indexed, &self.file_head.content) else {
+            return closing;
+        };
         if !self.has_wrong_checksum {
             return closing;
         }
