@@ -17,6 +17,8 @@ pub struct CompleteState {
     pub particles: Vec<ParticleState>,
     /// The rest of the state: an encoded [`sim_solver::Keyframe`].
     pub keyframe: Vec<u8>,
+    /// Hash of the particles and of the torn constraints.
+    pub state_hash: u64,
 }
 
 /// The reason why a recording gives no complete state of a step.
@@ -80,30 +82,87 @@ pub fn complete_state(
     if count > steps_max {
         return Err(CompleteStateError::TooFar { step, count, max: steps_max });
     }
-    let mut frames = FrameReader::new(tape.log().reader(stop)?);
-    let log = frames.log();
-    let scene = match count {
-        0 => recorded_scene(log)?,
-        _ => scene_to_simulate(log)?,
-    };
-    let scene_hash = scene_hash(log.scene());
-    let simulation = Resimulation::start(&scene, &first)?;
-    let mut simulation = simulation.ok_or(CompleteStateError::NoStart { step })?;
-    simulation.compare_start(&first).require_identical()?;
+    let log = tape.log().reader(stop)?;
+    let simulated = Simulated::start(&log, &first, step)?;
+    let mut frames = FrameReader::new(log);
     if count > 0 {
         tape.wind(&mut frames, begin)?;
     }
-    while simulation.step() < step {
-        let frame = frames.next_frame()?.ok_or(CompleteStateError::Ended { step })?;
-        if frame.row.step > step {
-            simulation.advance_to(step, &frame, stop.flag()).require_identical()?;
-            let state = state_of(&simulation, scene_hash);
-            simulation.advance(&frame, stop.flag()).require_identical()?;
-            return Ok(state);
-        }
-        simulation.advance(&frame, stop.flag()).require_identical()?;
+    simulated.advance(&mut frames, step, stop)
+}
+
+/// Returns the state at a place that [`find_state`] has found in the same file, simulated from its keyframe by
+/// `threads` threads, and compared with every snapshot on the way.
+///
+/// # Errors
+/// If the file cannot be read, or the recording does not lead to the step.
+pub fn state_at_place<R: Read>(
+    log: LogReader<R>,
+    place: StatePlace,
+    threads: usize,
+    stop: &Stop,
+) -> Result<CompleteState, CompleteStateError> {
+    let StatePlace { step, keyframe_step } = place;
+    let mut first = None;
+    let mut frames = FrameReader::new(log);
+    while first.as_ref().is_none_or(|frame: &Frame| frame.row.step < keyframe_step) {
+        first = Some(frames.next_frame()?.ok_or(CompleteStateError::Ended { step })?);
     }
-    Ok(state_of(&simulation, scene_hash))
+    let first = first.ok_or(CompleteStateError::NoStart { step })?;
+    let mut simulated = Simulated::start(frames.log(), &first, step)?;
+    simulated.simulation.set_threads(threads);
+    simulated.advance(&mut frames, step, stop)
+}
+
+/// The simulation of a recording from one of its complete states.
+struct Simulated {
+    scene_hash: u64,
+    simulation: Resimulation,
+}
+
+impl Simulated {
+    /// Starts at a complete state, to simulate up to a step.
+    fn start<R: Read>(
+        log: &LogReader<R>,
+        first: &Frame,
+        step: u64,
+    ) -> Result<Self, CompleteStateError> {
+        let is_simulated = step > first.row.step;
+        let scene = if is_simulated { scene_to_simulate(log)? } else { recorded_scene(log)? };
+        let simulation = Resimulation::start(&scene, first)?;
+        let mut simulation = simulation.ok_or(CompleteStateError::NoStart { step })?;
+        simulation.compare_start(first).require_identical()?;
+        Ok(Self { scene_hash: scene_hash(log.scene()), simulation })
+    }
+
+    /// Simulates up to a step. A step without a snapshot is proved by the next one.
+    fn advance<R: Read>(
+        mut self,
+        frames: &mut FrameReader<R>,
+        step: u64,
+        stop: &Stop,
+    ) -> Result<CompleteState, CompleteStateError> {
+        while self.simulation.step() < step {
+            let frame = frames.next_frame()?.ok_or(CompleteStateError::Ended { step })?;
+            if frame.row.step > step {
+                self.simulation.advance_to(step, &frame, stop.flag()).require_identical()?;
+                let state = self.state();
+                self.simulation.advance(&frame, stop.flag()).require_identical()?;
+                return Ok(state);
+            }
+            self.simulation.advance(&frame, stop.flag()).require_identical()?;
+        }
+        Ok(self.state())
+    }
+
+    fn state(&self) -> CompleteState {
+        CompleteState {
+            scene_hash: self.scene_hash,
+            particles: self.simulation.particles().to_vec(),
+            keyframe: self.simulation.keyframe().encode(),
+            state_hash: self.simulation.state_hash(),
+        }
+    }
 }
 
 /// Returns the last complete state up to a step.
@@ -124,11 +183,6 @@ fn find_start(tape: &mut Tape, step: u64) -> Result<Frame, CompleteStateError> {
         }
         up_to = begin.checked_sub(1).ok_or(no_start)?;
     }
-}
-
-fn state_of(simulation: &Resimulation, scene_hash: u64) -> CompleteState {
-    let (particles, keyframe) = (simulation.particles().to_vec(), simulation.keyframe().encode());
-    CompleteState { scene_hash, particles, keyframe }
 }
 
 /// The state to look for.
@@ -190,7 +244,7 @@ pub fn find_state<R: Read>(
             break;
         }
         before = Some(step);
-        if frame.own_keyframe().is_some() && frame.particles.is_some() {
+        if frame.is_complete_state() {
             keyframe_step = Some(step);
         }
         found = keyframe_step.map(|keyframe_step| StatePlace { step, keyframe_step });

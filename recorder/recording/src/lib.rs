@@ -67,13 +67,13 @@ pub mod verification;
 
 pub use complete_state::{
     CompleteState, CompleteStateError, FindStateError, StatePlace, Wanted, complete_state,
-    find_state,
+    find_state, state_at_place,
 };
 pub use counted::counted;
 pub use intact_parts::{IntactParts, RepairedBytes, load_rows};
 pub use log::*;
 pub use recorded_scene::{RecordedSceneError, recorded_scene, scene_to_simulate};
 pub use scene_drawing::{DrawnMesh, SCENE_TOPIC, SceneDrawing};
-pub use scene_state::{SceneState, SceneStateError, visit_states};
+pub use scene_state::{SceneState, SceneStateError, SceneStates};
 pub use sim_contract::{Existing, PartFile, PartFileError};
 pub use sim_solver::scene::Up;

@@ -1,7 +1,6 @@
 //! The state of a scene at a snapshot, with everything that pictures and meshes show.
 
 use std::io::Read;
-use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use sim_contract::{
@@ -71,7 +70,7 @@ pub struct SceneState {
     pub colliders: Vec<ColliderRow>,
     /// The triangles of the colliders that are meshes. `None` if no collider is a mesh.
     pub collider_meshes: Option<Arc<ColliderMeshes>>,
-    /// The outcomes of commands since the last visited state, from the first visited step on.
+    /// The outcomes of commands since the last state that [`SceneStates`] has returned.
     pub outcomes: Vec<OutcomeRow>,
     /// The forces of the step, if the recording has them.
     pub forces: Option<ForcesRow>,
@@ -79,37 +78,47 @@ pub struct SceneState {
     pub parameters: Option<ParameterValues>,
 }
 
-/// Reads a recording and calls `visit` with its state at each of `steps`, which ascend, or at each recorded
-/// step, until `visit` breaks.
-///
-/// # Errors
-/// The file cannot be read, its messages contradict each other, or `visit` fails.
-pub fn visit_states<R: Read, E: From<SceneStateError>>(
-    log: LogReader<R>,
-    steps: Option<&[u64]>,
-    mut visit: impl FnMut(&SceneState) -> Result<ControlFlow<()>, E>,
-) -> Result<(), E> {
-    let first_step = steps.and_then(|steps| steps.first().copied()).unwrap_or_default();
-    let mut steps = steps.map(|steps| steps.iter().copied().peekable());
-    let mut frames = FrameReader::new(log);
-    let mut state = SceneState::default();
-    let mut tears = TearTracker::new(Torn::default());
-    while steps.as_mut().is_none_or(|steps| steps.peek().is_some()) {
-        let Some(frame) = frames.next_frame().map_err(SceneStateError::from)? else { break };
-        state.apply_frame(frame, &mut tears)?;
-        state.read_meshes(frames.log());
-        state.outcomes.retain(|row| row.step >= first_step);
-        let step = state.row.step;
-        if steps.as_mut().is_none_or(|steps| steps.next_if_eq(&step).is_some()) {
-            state.set_torn(tears.torn().iter().flat_map(|torn| torn.indices()))?;
-            state.check_indices()?;
-            if visit(&state)?.is_break() {
+/// The states of a recording, in their order. One of them is in memory.
+#[derive(Debug)]
+pub struct SceneStates<R> {
+    frames: FrameReader<R>,
+    state: SceneState,
+    tears: TearTracker,
+    /// A state was returned.
+    has_begun: bool,
+}
+
+impl<R: Read> SceneStates<R> {
+    /// Begins at the start of a recording.
+    pub fn new(log: LogReader<R>) -> Self {
+        let (frames, tears) = (FrameReader::new(log), TearTracker::new(Torn::default()));
+        Self { frames, state: SceneState::default(), tears, has_begun: false }
+    }
+
+    /// Returns the state at the next recorded step from `step` on, or `None` at the end of the readable part. The first
+    /// state that is returned has no outcomes of steps before `step`.
+    ///
+    /// # Errors
+    /// If the file cannot be read, or its messages contradict each other.
+    pub fn next_from(&mut self, step: u64) -> Result<Option<&SceneState>, SceneStateError> {
+        let Self { frames, state, tears, has_begun } = self;
+        state.outcomes.clear();
+        loop {
+            let Some(frame) = frames.next_frame()? else { return Ok(None) };
+            state.apply_frame(frame, tears)?;
+            state.read_meshes(frames.log());
+            if !*has_begun {
+                state.outcomes.retain(|row| row.step >= step);
+            }
+            if state.row.step >= step {
                 break;
             }
-            state.outcomes.clear();
         }
+        *has_begun = true;
+        state.set_torn(tears.torn().iter().flat_map(|torn| torn.indices()))?;
+        state.check_indices()?;
+        Ok(Some(state))
     }
-    Ok(())
 }
 
 impl SceneState {

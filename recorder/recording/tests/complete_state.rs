@@ -39,6 +39,7 @@ fn solver_states() -> Vec<CompleteState> {
         scene_hash,
         particles: bytemuck::cast_slice(solver.particles()).to_vec(),
         keyframe: solver.keyframe().encode(),
+        state_hash: solver.state_hash(),
     };
     let mut solver = Solver::new(&job.scene);
     let mut states = vec![state(&solver)];

@@ -27,8 +27,7 @@ use anyhow::Context;
 use clap::error::ErrorKind;
 use recording::pictures::{Bend, PictureOptions, Size, Style, View};
 use recording::{
-    IntactParts, LogEnd, LogReader, ReadError, SceneState, SceneStateError, open_regular_file,
-    visit_states,
+    IntactParts, LogEnd, LogReader, ReadError, SceneState, SceneStates, open_regular_file,
 };
 use sim_contract::Stop;
 
@@ -238,18 +237,18 @@ fn export<R: Read>(
 ) -> anyhow::Result<()> {
     let visit = |visitor: &mut dyn FnMut(&SceneState) -> anyhow::Result<ControlFlow<()>>| {
         let bar = progress_bar(steps.len() as u64);
-        // Only errors of reading get the name of the recording.
-        let mut refused = None;
-        let visited: Result<(), SceneStateError> = visit_states(open()?, Some(steps), |state| {
+        let mut states = SceneStates::new(open()?);
+        for step in steps {
+            // Only errors of reading get the name of the recording.
+            let state = states.next_from(*step).with_context(|| output::path_text(&args.file))?;
             bar.inc(1);
-            visitor(state).or_else(|error| {
-                refused = Some(error);
-                Ok(ControlFlow::Break(()))
-            })
-        });
+            let Some(state) = state.filter(|state| state.row.step == *step) else { break };
+            if visitor(state)?.is_break() {
+                break;
+            }
+        }
         bar.finish_and_clear();
-        visited.with_context(|| output::path_text(&args.file))?;
-        refused.map_or(Ok(()), Err)
+        Ok(())
     };
     let snapshots = survey.snapshots(steps, &visit, open_bytes);
     let frames_per_s = args.fps.filter(|_| format.data().is_some_and(DataFormat::has_frames));

@@ -6,15 +6,9 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context, bail};
-use recording::verification::Resimulation;
-use recording::{
-    FindStateError, Frame, FrameReader, LogReader, StatePlace, Wanted, find_state, recorded_scene,
-};
+use recording::{FindStateError, FrameReader, LogReader, Wanted, find_state, state_at_place};
 use serde::Serialize;
-use sim_contract::{
-    Action, Client, GivenState, Outcome, ParticleState, Stop, report_bus_errors, scene_hash,
-};
-use sim_solver::SOLVER_VERSION;
+use sim_contract::{Action, Client, GivenState, Outcome, Stop, report_bus_errors, scene_hash};
 
 use crate::cli::args::{EndpointArgs, ThreadArgs};
 use crate::cli::damaged_input::{lacks, lacks_state};
@@ -73,16 +67,6 @@ impl fmt::Display for Report {
     }
 }
 
-/// A complete state of a recording.
-#[derive(Debug)]
-struct RecordedState {
-    step: u64,
-    scene_hash: u64,
-    particles: Vec<ParticleState>,
-    keyframe: Vec<u8>,
-    state_hash: u64,
-}
-
 pub(crate) fn run(args: &RestoreArgs) -> anyhow::Result<Exit> {
     let stop = Stop::install()?;
     report_bus_errors()?;
@@ -102,14 +86,15 @@ pub(crate) fn run(args: &RestoreArgs) -> anyhow::Result<Exit> {
         None => lacks_state(&args.file, error),
     });
     let place = place.with_context(|| path.clone())?;
-    let state = read_state(&args.file, place, args.threads.count(), &stop).context(path)?;
+    let log = LogReader::open_until(&args.file, &stop).with_context(|| path.clone())?;
+    let state = state_at_place(log, place, args.threads.count(), &stop).context(path)?;
     let given = GivenState {
         scene_hash: state.scene_hash,
         particles: &state.particles,
         keyframe: Some(&state.keyframe),
     };
     let outcome = client.restore(&given, args.timeout)?;
-    let report = check_outcome(&outcome, &state)?;
+    let report = check_outcome(&outcome, place.step, state.state_hash)?;
     output::result(args.as_json, &report, &report.to_string())?;
     Ok(Exit::Done)
 }
@@ -177,7 +162,7 @@ fn complete_steps(path: &Path, stop: &Stop) -> anyhow::Result<Option<RangeInclus
     let mut frames = FrameReader::new(LogReader::open_until(path, stop)?);
     let (mut first, mut last) = (None, 0);
     while let Some(frame) = frames.next_frame()? {
-        if frame.own_keyframe().is_some() && frame.particles.is_some() {
+        if frame.is_complete_state() {
             first.get_or_insert(frame.row.step);
         }
         last = frame.row.step;
@@ -185,61 +170,7 @@ fn complete_steps(path: &Path, stop: &Stop) -> anyhow::Result<Option<RangeInclus
     Ok(first.map(|first| first..=last))
 }
 
-/// Reads the state, and simulates it from the keyframe if it has none of its own.
-fn read_state(
-    path: &Path,
-    place: StatePlace,
-    threads: usize,
-    stop: &Stop,
-) -> anyhow::Result<RecordedState> {
-    let log = LogReader::open_until(path, stop)?;
-    let scene_hash = scene_hash(log.scene());
-    let version = log.run().solver_version;
-    let needs_simulation = place.step != place.keyframe_step;
-    if needs_simulation && version != SOLVER_VERSION {
-        bail!(
-            "step {} has no keyframe, and was recorded with solver version {version}, but this program \
-             has version {SOLVER_VERSION}. Step {} has one",
-            place.step,
-            place.keyframe_step
-        );
-    }
-    let scene = recorded_scene(&log)?;
-    let mut frames = FrameReader::new(log);
-    let mut simulation: Option<Resimulation> = None;
-    while let Some(frame) = frames.next_frame()? {
-        let step = frame.row.step;
-        if step < place.keyframe_step {
-            continue;
-        }
-        match &mut simulation {
-            None => {
-                let mut start = Resimulation::start(&scene, &frame)?.context("has no keyframe")?;
-                start.set_threads(threads);
-                start.compare_start(&frame).require_identical()?;
-                simulation = Some(start);
-            }
-            Some(simulation) => simulation.advance(&frame, stop.flag()).require_identical()?,
-        }
-        if step == place.step {
-            let simulation = simulation.context("has no keyframe")?;
-            return Ok(state(&frame, scene_hash, &simulation));
-        }
-    }
-    bail!("ends before step {}", place.step)
-}
-
-fn state(frame: &Frame, scene_hash: u64, simulation: &Resimulation) -> RecordedState {
-    RecordedState {
-        step: frame.row.step,
-        scene_hash,
-        particles: simulation.particles().to_vec(),
-        keyframe: simulation.keyframe().encode(),
-        state_hash: frame.row.state_hash,
-    }
-}
-
-fn check_outcome(outcome: &Outcome, state: &RecordedState) -> anyhow::Result<Report> {
+fn check_outcome(outcome: &Outcome, recorded_step: u64, expected: u64) -> anyhow::Result<Report> {
     let step = outcome.step;
     if let Some(reason) = outcome.reason() {
         bail!("the node refused the state at step {step}: {reason} (see its messages)");
@@ -247,14 +178,13 @@ fn check_outcome(outcome: &Outcome, state: &RecordedState) -> anyhow::Result<Rep
     let Action::Restore { state_hash, .. } = outcome.command.action() else {
         bail!("the node answered with an outcome of another command");
     };
-    if !outcome.is_applied() || state_hash != state.state_hash {
+    if !outcome.is_applied() || state_hash != expected {
         bail!(
             "the node has the state hash {state_hash:016x} at step {step}, but the recording has \
-             {:016x}",
-            state.state_hash
+             {expected:016x}"
         );
     }
-    Ok(Report { recorded_step: state.step, step, state_hash: format!("{state_hash:016x}") })
+    Ok(Report { recorded_step, step, state_hash: format!("{state_hash:016x}") })
 }
 
 #[cfg(test)]

@@ -117,6 +117,11 @@ impl Resimulation {
         bytemuck::cast_slice(self.solver.particles())
     }
 
+    /// Returns the hash of the state after that step.
+    pub fn state_hash(&self) -> u64 {
+        self.solver.state_hash()
+    }
+
     /// Returns the rest of the state after that step.
     pub fn keyframe(&self) -> Keyframe {
         let mut keyframe = self.solver.keyframe();

@@ -110,7 +110,14 @@ fn with_snapshots<T>(
     let survey = survey_of(file, "test.mcap");
     let steps = steps.unwrap_or(&survey.steps);
     let visit = |visitor: &mut dyn FnMut(&SceneState) -> anyhow::Result<ControlFlow<()>>| {
-        visit_states(LogReader::new(file)?, Some(steps), visitor)
+        let mut states = SceneStates::new(LogReader::new(file)?);
+        for step in steps {
+            let Some(state) = states.next_from(*step)? else { break };
+            if visitor(state)?.is_break() {
+                break;
+            }
+        }
+        Ok(())
     };
     let bytes = file.to_vec();
     let open_bytes = || Ok(Box::new(Cursor::new(bytes.clone())) as Box<dyn Read>);

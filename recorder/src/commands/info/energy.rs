@@ -2,12 +2,9 @@
 
 use std::fmt;
 use std::io::Read;
-use std::ops::ControlFlow;
 
 use anyhow::Context;
-use recording::{
-    EnergyRow, FrameReader, LogReader, SceneState, SceneStateError, recorded_scene, visit_states,
-};
+use recording::{EnergyRow, FrameReader, LogReader, SceneStates, recorded_scene};
 use serde::Serialize;
 use sim_solver::{EnergyMeter, Scene};
 
@@ -65,12 +62,12 @@ fn measured<R: Read>(log: LogReader<R>, scene: &Scene) -> anyhow::Result<Option<
     log.selection().require_all_particles("`recorder info --energy`")?;
     let mut meter = EnergyMeter::new(scene);
     let mut range = None;
-    visit_states(log, None, |state: &SceneState| {
+    let mut states = SceneStates::new(log);
+    while let Some(state) = states.next_from(0)? {
         if let Some(energy) = state.energy(&mut meter) {
             range = Some(EnergyRange::with(range, state.row.step, energy));
         }
-        Ok::<_, SceneStateError>(ControlFlow::Continue(()))
-    })?;
+    }
     Ok(range)
 }
 

@@ -85,7 +85,7 @@ impl Survey {
         let mut frames = FrameReader::new(log);
         while let Some(frame) = frames.next_frame()? {
             let step = frame.row.step;
-            if frame.own_keyframe().is_some() && frame.particles.is_some() {
+            if frame.is_complete_state() {
                 survey.states.push(step);
                 let outcome_count = frame.row.outcome_count;
                 _ = survey.first_state.get_or_insert(Start { step, outcome_count });
