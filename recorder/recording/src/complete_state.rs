@@ -5,7 +5,7 @@ use std::io::Read;
 use sim_contract::{ParticleState, Stop, scene_hash};
 
 use super::log::{Frame, FrameReader, LogEnd, LogReader, Message, ReadError, Tape, TapeError};
-use super::recorded_scene::{RecordedSceneError, recorded_scene, scene_to_simulate};
+use super::scene_state::{RecordedSceneError, recorded_scene, scene_to_simulate};
 use super::verification::{NotIdentical, Resimulation, ResimulationError};
 
 /// A complete state, from which a simulation continues with the recorded bits.

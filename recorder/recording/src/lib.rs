@@ -59,7 +59,6 @@ mod log;
 pub mod pictures;
 #[cfg(test)]
 mod proof_tests;
-mod recorded_scene;
 mod scene_drawing;
 mod scene_state;
 pub mod simulation;
@@ -72,8 +71,9 @@ pub use complete_state::{
 pub use counted::counted;
 pub use intact_parts::{IntactParts, RepairedBytes, load_rows};
 pub use log::*;
-pub use recorded_scene::{RecordedSceneError, recorded_scene, scene_to_simulate};
 pub use scene_drawing::{DrawnMesh, SCENE_TOPIC, SceneDrawing};
-pub use scene_state::{SceneState, SceneStateError, SceneStates};
+pub use scene_state::{
+    RecordedSceneError, SceneState, SceneStateError, SceneStates, recorded_scene, scene_to_simulate,
+};
 pub use sim_contract::{Existing, PartFile, PartFileError};
 pub use sim_solver::scene::Up;

@@ -12,7 +12,6 @@ mod read_error;
 mod rows;
 mod run;
 mod scanner;
-mod state_hash;
 mod tape;
 mod tears;
 mod topic;
@@ -46,9 +45,8 @@ pub use rows::{
 };
 pub use run::selection::ContentSelection;
 pub use run::{CLOSING_METADATA, Closing, FORMAT_VERSION, RunDescription, SCENE_ATTACHMENT};
-pub use state_hash::state_hash;
 pub use tape::{Tape, TapeError, TapeState};
-pub use tears::{TearTracker, torn_before_first};
+pub use tears::{TearTracker, state_hash, torn_before_first};
 pub use topic::{AllCounts, Topic, TopicCounts};
 pub(crate) use writer::replace_run_id;
 pub use writer::{Compression, LogOptions, LogWriter, WriteError};

@@ -1,20 +1,20 @@
-//! The state of a scene at a snapshot, with everything that pictures and meshes show.
+//! The scene of a recording, and its state at a snapshot with everything that pictures and meshes show.
 
 use std::io::Read;
+use std::str::Utf8Error;
 use std::sync::Arc;
 
 use sim_contract::{
     ColliderState, ConstraintState, ParameterValues, ParticleState, Torn, Triangle,
 };
-use sim_solver::scene::{ColliderMesh, ColliderMeshes};
-use sim_solver::{EnergyMeter, Scene, Solver, TornSides};
+use sim_solver::scene::{ColliderMesh, ColliderMeshes, SceneError};
+use sim_solver::{EnergyMeter, SOLVER_VERSION, Scene, Solver, TornSides};
 
-use crate::log::{
+use super::log::{
     ColliderRow, CollidersRow, EnergyRow, ForcesRow, Frame, FrameReader, LogReader, Message,
     OutcomeRow, ReadError, ShapeRow, StepRow, Tape, TapeError, TearTracker, constraint_state,
 };
-use crate::recorded_scene::recorded_scene;
-use crate::simulation::{colliders_row, forces_row, step_row};
+use super::simulation::{colliders_row, forces_row, step_row};
 
 /// The reason why the state of a recording cannot be shown.
 #[derive(Debug, thiserror::Error)]
@@ -315,4 +315,50 @@ impl SceneState {
 /// Returns the indices at which the value is true.
 fn indices(is_torn: &[bool]) -> impl Iterator<Item = u32> {
     (0_u32..).zip(is_torn).filter(|(_, is_torn)| **is_torn).map(|(index, _)| index)
+}
+
+/// The reason why the scene of a recording cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordedSceneError {
+    /// Another version of the solver recorded it.
+    #[error(
+        "recorded with solver version {version}, but this program has version {SOLVER_VERSION}, whose \
+         bits differ. Use the program that recorded it"
+    )]
+    OtherSolver {
+        /// The version of the solver that recorded it.
+        version: u32,
+    },
+    /// The recording has no scene.
+    #[error("has no scene (attachment scene.toml)")]
+    Missing,
+    /// The scene is not UTF-8.
+    #[error("its attachment scene.toml is not text")]
+    NotText(#[from] Utf8Error),
+    /// The scene is invalid.
+    #[error(transparent)]
+    Invalid(#[from] SceneError),
+}
+
+/// Parses the scene in a recording.
+///
+/// # Errors
+/// If the recording has no valid scene. Errors do not name the recording.
+pub fn recorded_scene<R: Read>(log: &LogReader<R>) -> Result<Scene, RecordedSceneError> {
+    if log.scene().is_empty() {
+        return Err(RecordedSceneError::Missing);
+    }
+    Ok(Scene::from_toml(std::str::from_utf8(log.scene())?, "scene.toml")?)
+}
+
+/// Parses the scene of a recording that can be simulated again: one of this solver's version.
+///
+/// # Errors
+/// Like [`recorded_scene`], and for another version of the solver.
+pub fn scene_to_simulate<R: Read>(log: &LogReader<R>) -> Result<Scene, RecordedSceneError> {
+    let version = log.run().solver_version;
+    if version != SOLVER_VERSION {
+        return Err(RecordedSceneError::OtherSolver { version });
+    }
+    recorded_scene(log)
 }

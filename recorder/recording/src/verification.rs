@@ -17,8 +17,8 @@ use std::thread;
 
 use sim_solver::Solver;
 
+use super::scene_state::{RecordedSceneError, scene_to_simulate};
 use crate::log::{Frame, FrameReader, GapCounter, LogEnd, LogReader, Message, ReadError};
-use crate::recorded_scene::{RecordedSceneError, scene_to_simulate};
 pub use finding::{
     Difference, NotIdentical, SnapshotDifference, SnapshotFinding, StepGap, distance,
     first_difference, snapshot_difference,

@@ -1,6 +1,5 @@
 //! `recorder info`: the content of a recording.
 
-mod columns;
 mod energy;
 mod graph;
 mod report;
@@ -18,9 +17,8 @@ use sim_contract::Stop;
 use crate::cli::args::OverwriteArgs;
 use crate::cli::damaged_input::intact_parts;
 use crate::cli::output::{self, AsJson, Exit};
-use columns::{ColumnCollector, Columns};
 use energy::EnergyReport;
-use graph::{COLUMNS_MAX, Graph};
+use graph::{COLUMNS_MAX, ColumnCollector, Columns, Graph};
 use report::{Info, inspect};
 use timing::{Timing, period_ns};
 

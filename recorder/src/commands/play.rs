@@ -3,7 +3,6 @@
 mod control;
 mod keyboard;
 mod lockstep;
-mod pace;
 mod player;
 mod playlist;
 mod position;
@@ -23,10 +22,9 @@ use sim_contract::{Stop, report_bus_errors};
 use crate::cli::args::EndpointArgs;
 use crate::cli::output::{self, Exit};
 use crate::cli::parse::{self, whole_number};
-use control::{Control, MAX_RATE, RATES};
+use control::{Control, MAX_RATE, Pace, RATES};
 use keyboard::Keyboard;
 use lockstep::Lockstep;
-use pace::Pace;
 use player::{Plan, Player, Speed};
 use playlist::Playlist;
 

@@ -23,8 +23,7 @@ use sim_solver::{Scene, Solver};
 use crate::cli::args::{FileArgs, LogFile, ThreadArgs};
 use crate::cli::output::{self, AsJson, Exit, progress_bar, progress_spinner, with_usage};
 use crate::cli::parse::whole_number;
-use crate::input::command_source::CommandSource;
-use crate::input::scene_source::{is_recording, load_scene};
+use crate::input::{CommandSource, is_recording, load_scene};
 use changes::{Changed, Changes, Survey, parse_setting};
 use completion::Completion;
 

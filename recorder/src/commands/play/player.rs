@@ -6,10 +6,9 @@ use recording::Frame;
 use sim_contract::clock::{SECOND_NS, monotonic_ns, sleep_until};
 use sim_contract::{Action, Command, Endpoint, Owner, Reason, ReceivedCommand, Stop};
 
-use super::control::{Control, Request, Target};
+use super::control::{Control, Pace, Request, Target};
 use super::keyboard::{Key, Keyboard};
 use super::lockstep::Lockstep;
-use super::pace::Pace;
 use super::playlist::{Place, Playlist};
 use super::recording::Start;
 use super::replay::{Playback, Replay};

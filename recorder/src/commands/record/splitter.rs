@@ -1,7 +1,6 @@
 //! The way from the states of a tap into the queue: one file after the other.
 
 pub(crate) mod selector;
-pub(crate) mod time_limit;
 pub(crate) mod trigger;
 
 use std::sync::Arc;
@@ -13,11 +12,10 @@ use sim_contract::{LostChanges, ReadError, State, StatusFlags};
 use super::batch::{Batch, Messages, RunEnd, StopReason};
 use super::queue::{Content, FileEnd, Item, Queue};
 use super::session::{Session, Skipped};
-use super::split::{FileBegin, SplitArgs, WritePosition};
+use super::split::{FileBegin, FirstStep, SplitArgs, TimeLimit, WritePosition};
 use super::start::{FirstState, LoadError, Now};
 use crate::cli::output;
 use selector::Selector;
-use time_limit::{FirstStep, TimeLimit};
 use trigger::{PartEnd, Trigger};
 
 /// Shortest part of a black box. A part repeats the scene and the constraints.

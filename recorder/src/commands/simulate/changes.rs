@@ -13,7 +13,7 @@ use recording::{
 use sim_contract::{Action, Parameter, Part, Reason, Stop};
 use sim_solver::{Keyframe, Scene, Solver};
 
-use crate::input::command_source::{COMMANDS_MAX, timed_command};
+use crate::input::{COMMANDS_MAX, timed_command};
 
 /// Changes of the commands of a recording.
 #[derive(Debug, Default)]

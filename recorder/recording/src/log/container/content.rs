@@ -16,7 +16,7 @@ use crate::log::rows::{ForcesRow, StepRow, TearsRow};
 use crate::log::run::RunDescription;
 use crate::log::run::selection::ContentSelection;
 use crate::log::scanner::limits::SizeLimits;
-use crate::log::state_hash::{HashSeeds, hash_bytes};
+use crate::log::tears::{HashSeeds, hash_bytes};
 use crate::log::topic::{AllCounts, Topic};
 
 /// Size of a particle in a message.
