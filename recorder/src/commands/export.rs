@@ -38,7 +38,7 @@ use crate::cli::parse::{self, whole_number_in};
 use data::DataFormat;
 use files::{FrameNames, Target};
 use format_args::{Format, FormatArgs};
-use pictures::Pace;
+use pictures::FramePace;
 use selection::{Choice, Moment, Selection, SnapshotRange};
 use snapshots::{OpenBytes, Snapshots};
 use survey::Survey;
@@ -303,12 +303,12 @@ impl ExportArgs {
     }
 
     /// Returns the pace of an animation.
-    fn pace(&self) -> Pace {
+    fn pace(&self) -> FramePace {
         let frame_time = self.frame_time();
         if self.frames.is_some() || !self.at.is_empty() {
-            return Pace { frame_time, period: None };
+            return FramePace { frame_time, period: None };
         }
-        Pace { frame_time, period: Some(self.every.unwrap_or(frame_time)) }
+        FramePace { frame_time, period: Some(self.every.unwrap_or(frame_time)) }
     }
 
     /// Refuses options that the format ignores.

@@ -49,7 +49,7 @@ pub(crate) struct RestoreArgs {
 
 /// The result, as printed.
 #[derive(Debug, Serialize)]
-struct Report {
+struct RestoreReport {
     /// Step of the recording.
     recorded_step: u64,
     /// Step of the node that has its state.
@@ -57,7 +57,7 @@ struct Report {
     state_hash: String,
 }
 
-impl fmt::Display for Report {
+impl fmt::Display for RestoreReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { recorded_step, step, state_hash } = self;
         write!(
@@ -170,7 +170,11 @@ fn complete_steps(path: &Path, stop: &Stop) -> anyhow::Result<Option<RangeInclus
     Ok(first.map(|first| first..=last))
 }
 
-fn check_outcome(outcome: &Outcome, recorded_step: u64, expected: u64) -> anyhow::Result<Report> {
+fn check_outcome(
+    outcome: &Outcome,
+    recorded_step: u64,
+    expected: u64,
+) -> anyhow::Result<RestoreReport> {
     let step = outcome.step;
     if let Some(reason) = outcome.reason() {
         bail!("the node refused the state at step {step}: {reason} (see its messages)");
@@ -184,7 +188,7 @@ fn check_outcome(outcome: &Outcome, recorded_step: u64, expected: u64) -> anyhow
              {expected:016x}"
         );
     }
-    Ok(Report { recorded_step, step, state_hash: format!("{state_hash:016x}") })
+    Ok(RestoreReport { recorded_step, step, state_hash: format!("{state_hash:016x}") })
 }
 
 #[cfg(test)]

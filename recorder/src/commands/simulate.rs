@@ -24,7 +24,7 @@ use crate::cli::args::{FileArgs, LogFile, ThreadArgs};
 use crate::cli::output::{self, AsJson, Exit, progress_bar, progress_spinner, with_usage};
 use crate::cli::parse::whole_number;
 use crate::input::{CommandSource, is_recording, load_scene};
-use changes::{Changed, Changes, Survey, parse_setting};
+use changes::{Changed, Changes, ChangesSurvey, parse_setting};
 use completion::Completion;
 
 /// Steps between two updates of the progress bar.
@@ -165,7 +165,7 @@ fn run_changed(args: &SimulateArgs, stop: &Stop) -> anyhow::Result<Exit> {
     let source = args.commands(stop)?;
     let path = Path::new(&args.scene);
     let in_scene = || args.scene.clone();
-    let survey = Survey::read(path, stop).with_context(in_scene)?;
+    let survey = ChangesSurvey::read(path, stop).with_context(in_scene)?;
     let first_state = survey.first_state().with_context(in_scene)?;
     let replaced = source.map(|source| source.after(first_state)).transpose()?;
     let changes = Changes { dropped: args.drop.clone(), added: args.set.clone(), replaced };

@@ -35,9 +35,9 @@ const PRIVATE_MIN: u8 = 0x80;
 
 /// A part of a file.
 #[derive(Debug)]
-pub(super) enum Part<'a> {
+pub(super) enum FilePart<'a> {
     /// A record whose form is intact. The end of the data and the footer end a section.
-    Record { byte: u64, opcode: u8, body: &'a [u8], section: Option<Section> },
+    Record { byte: u64, opcode: u8, body: &'a [u8], section: Option<SectionChecksum> },
     /// A chunk whose form is intact, and whose sizes are within the limits. `size_bytes` is the size of its record.
     Chunk { byte: u64, size_bytes: usize, chunk: Chunk<'a> },
     /// An attachment that is too long for memory.
@@ -54,13 +54,13 @@ pub(super) enum Part<'a> {
 
 /// The checksum of a section of the file: in the record that ends the section, and of the bytes that were read.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Section {
+pub(super) struct SectionChecksum {
     /// 0 if the file has none.
     pub(super) saved: u32,
     pub(super) calculated: u32,
 }
 
-impl Section {
+impl SectionChecksum {
     pub(super) fn is_wrong(self) -> bool {
         self.saved != 0 && self.saved != self.calculated
     }
@@ -160,7 +160,7 @@ impl<R: Read> RecordScanner<R> {
     }
 
     /// Returns the next part, or `None` at the end of the file.
-    pub(super) fn next(&mut self) -> Result<Option<Part<'_>>, ReadError> {
+    pub(super) fn next(&mut self) -> Result<Option<FilePart<'_>>, ReadError> {
         self.window.check_stop()?;
         if self.is_done {
             return Ok(None);
@@ -174,12 +174,12 @@ impl<R: Read> RecordScanner<R> {
             Form::Chunk { header, start_size, size_bytes } => {
                 self.advance(byte + size_bytes as u64)?;
                 let data = &self.body(byte, size_bytes)?[start_size..];
-                Part::Chunk { byte, size_bytes, chunk: Chunk { header, data } }
+                FilePart::Chunk { byte, size_bytes, chunk: Chunk { header, data } }
             }
             Form::LongAttachment(attachment) => self.long_attachment(attachment)?,
             Form::Skipped { opcode, size_bytes } => {
                 let is_whole = self.advance(byte + size_bytes)?;
-                if is_whole { Part::Skipped { byte, opcode } } else { self.truncated(byte) }
+                if is_whole { FilePart::Skipped { byte, opcode } } else { self.truncated(byte) }
             }
             Form::EndOfFile => self.truncated(byte),
             Form::Wrong { cause, is_cut } => self.damage(byte, cause, is_cut)?,
@@ -187,9 +187,9 @@ impl<R: Read> RecordScanner<R> {
         Ok(Some(part))
     }
 
-    fn truncated(&mut self, byte: u64) -> Part<'static> {
+    fn truncated(&mut self, byte: u64) -> FilePart<'static> {
         self.is_done = true;
-        Part::Truncated { byte }
+        FilePart::Truncated { byte }
     }
 
     /// Returns the body of a record in memory.
@@ -197,7 +197,12 @@ impl<R: Read> RecordScanner<R> {
         Ok(&self.window.bytes(byte, size_bytes)?[RECORD_HEADER_SIZE_BYTES..])
     }
 
-    fn record(&mut self, byte: u64, opcode: u8, size_bytes: usize) -> Result<Part<'_>, ReadError> {
+    fn record(
+        &mut self,
+        byte: u64,
+        opcode: u8,
+        size_bytes: usize,
+    ) -> Result<FilePart<'_>, ReadError> {
         let end = byte + size_bytes as u64;
         let calculated = match opcode {
             op::DATA_END => {
@@ -217,15 +222,14 @@ impl<R: Read> RecordScanner<R> {
         };
         self.at = end;
         let body = self.body(byte, size_bytes)?;
-        let section = calculated.zip(body.last_chunk()).map(|(calculated, saved)| Section {
-            saved: u32::from_le_bytes(*saved),
-            calculated: calculated.finalize(),
+        let section = calculated.zip(body.last_chunk()).map(|(calculated, saved)| {
+            SectionChecksum { saved: u32::from_le_bytes(*saved), calculated: calculated.finalize() }
         });
-        Ok(Part::Record { byte, opcode, body, section })
+        Ok(FilePart::Record { byte, opcode, body, section })
     }
 
     /// Compares a long attachment with its checksum, in pieces.
-    fn long_attachment(&mut self, attachment: LongAttachment) -> Result<Part<'_>, ReadError> {
+    fn long_attachment(&mut self, attachment: LongAttachment) -> Result<FilePart<'_>, ReadError> {
         let mut hasher = Hasher::new();
         let LongAttachment { byte, size_bytes, data, .. } = &attachment;
         let (byte, mut at) = (*byte, byte + RECORD_HEADER_SIZE_BYTES as u64);
@@ -247,7 +251,7 @@ impl<R: Read> RecordScanner<R> {
             _ => Checksum::Wrong,
         };
         self.advance(byte + size_bytes)?;
-        Ok(Part::LongAttachment { attachment, checksum })
+        Ok(FilePart::LongAttachment { attachment, checksum })
     }
 
     /// Returns a range of the part that was read last.
@@ -264,21 +268,26 @@ impl<R: Read> RecordScanner<R> {
     }
 
     /// Returns the part that a damaged record spoils: up to the next record, or to the end.
-    fn damage(&mut self, byte: u64, cause: String, is_cut: bool) -> Result<Part<'_>, ReadError> {
+    fn damage(
+        &mut self,
+        byte: u64,
+        cause: String,
+        is_cut: bool,
+    ) -> Result<FilePart<'_>, ReadError> {
         let next = if self.goes_on { self.find_record(byte + 1)? } else { None };
         if let Some(next) = next {
             self.advance(next)?;
-            return Ok(Part::Damaged { bytes: byte..next, cause });
+            return Ok(FilePart::Damaged { bytes: byte..next, cause });
         }
         if is_cut {
             return Ok(self.truncated(byte));
         }
         self.is_done = true;
-        Ok(Part::Damaged { bytes: byte..self.size_bytes(), cause })
+        Ok(FilePart::Damaged { bytes: byte..self.size_bytes(), cause })
     }
 
     /// Checks the bytes after the footer.
-    fn end(&mut self) -> Result<Option<Part<'_>>, ReadError> {
+    fn end(&mut self) -> Result<Option<FilePart<'_>>, ReadError> {
         self.is_done = true;
         let (byte, end) = (self.at, self.size_bytes());
         let rest = self.window.bytes(byte, MAGIC.len() + 1)?;
@@ -287,13 +296,13 @@ impl<R: Read> RecordScanner<R> {
             return Ok(None);
         }
         if rest.starts_with(MAGIC) {
-            return Ok(Some(Part::AfterEnd { bytes: byte + MAGIC.len() as u64..end }));
+            return Ok(Some(FilePart::AfterEnd { bytes: byte + MAGIC.len() as u64..end }));
         }
         if MAGIC.starts_with(rest) {
-            return Ok(Some(Part::Truncated { byte }));
+            return Ok(Some(FilePart::Truncated { byte }));
         }
         let cause = "the last bytes are not those of an MCAP file".to_owned();
-        Ok(Some(Part::Damaged { bytes: byte..end, cause }))
+        Ok(Some(FilePart::Damaged { bytes: byte..end, cause }))
     }
 
     /// Adds the bytes up to a position to the checksum, and continues there. Returns `false` if the file ends before it.

@@ -21,7 +21,7 @@ use super::run::RunDescription;
 use super::tears::{TearChange, TearTracker};
 use super::topic::Topic;
 use chunk_reader::ChunkReader;
-use search::{SnapshotPosition, StepRange, find, first_and_last};
+use search::{RecordedSteps, SnapshotPosition, find, first_and_last};
 
 /// The reason why a recording cannot be shown.
 #[derive(Debug, thiserror::Error)]
@@ -48,7 +48,7 @@ pub struct Tape {
     reader: ChunkReader,
     topology: TopologyRow,
     surface: SurfaceRow,
-    range: StepRange,
+    range: RecordedSteps,
     stride: u64,
 }
 
@@ -122,7 +122,7 @@ impl Tape {
         let ends = first_and_last(&mut reader)?;
         let (first_steps, last) =
             ends.ok_or_else(|| TapeError::NoSnapshot(reader.log().end().clone()))?;
-        let range = StepRange { first: first_steps[0], last: last.max(first_steps[0]) };
+        let range = RecordedSteps { first: first_steps[0], last: last.max(first_steps[0]) };
         let mut tape = Self { reader, topology, surface, range, stride: 1 };
         // The second snapshot may be in the next chunk.
         let second = tape.step_after(range.first)?;

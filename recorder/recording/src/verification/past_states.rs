@@ -10,7 +10,7 @@ use crate::log::OutcomeRow;
 /// The states that a re-simulation has computed, and those that commands have put in place.
 #[derive(Debug)]
 pub(super) struct PastStates {
-    spans: Vec<Span>,
+    spans: Vec<StateSpan>,
     placed: Vec<Placed>,
     /// The rest of the newest state.
     rest: Rest,
@@ -18,12 +18,12 @@ pub(super) struct PastStates {
 
 /// Digests of consecutive states. 8 bytes each: a day at 240 Hz takes 166 MB.
 #[derive(Debug)]
-struct Span {
+struct StateSpan {
     first_step: u64,
     digests: Vec<u64>,
 }
 
-impl Span {
+impl StateSpan {
     fn at(&self, step: u64) -> Option<u64> {
         let place = usize::try_from(step.checked_sub(self.first_step)?).ok()?;
         self.digests.get(place).copied()
@@ -52,7 +52,7 @@ impl PastStates {
     pub(super) fn restart(&mut self, first_step: u64, solver: &Solver) {
         self.rest = Rest::new(solver);
         let digests = vec![self.rest.state_digest(solver, solver.state_hash())];
-        self.spans.push(Span { first_step, digests });
+        self.spans.push(StateSpan { first_step, digests });
     }
 
     /// Adds the state after the next step. `is_commanded` is true if commands precede the step.
@@ -101,7 +101,7 @@ impl PastStates {
 /// The states of the parts of a recording, in order.
 #[derive(Debug, Default)]
 pub(super) struct AllStates {
-    spans: Vec<Span>,
+    spans: Vec<StateSpan>,
     /// Number of states that were put in place, and that no part has computed before.
     pub(super) given_count: u64,
 }

@@ -10,7 +10,7 @@ use serde_json::Value;
 use sim_contract::{Action, ParticleState};
 
 use super::report::{
-    CommandDifference, Distance, Growth, Report, SceneDifference, StateDifference,
+    CommandDifference, DiffReport, Distance, Growth, SceneDifference, StateDifference,
 };
 
 /// One of the two recordings.
@@ -83,7 +83,7 @@ pub(super) struct Comparison {
     a: Side,
     b: Side,
     rate_hz: u32,
-    report: Report,
+    report: DiffReport,
     growth: Growth,
 }
 
@@ -91,7 +91,8 @@ impl Comparison {
     pub(super) fn new(a: FrameReader<FileSource>, b: FrameReader<FileSource>) -> Self {
         let scene = scene_difference(a.log().scene(), b.log().scene());
         let rate_hz = a.log().run().rate_hz;
-        let report = Report { first: scene.as_ref().map(|_| "scene"), scene, ..Report::default() };
+        let report =
+            DiffReport { first: scene.as_ref().map(|_| "scene"), scene, ..DiffReport::default() };
         let (a, b) = (Side::new(a), Side::new(b));
         Self { a, b, rate_hz, report, growth: Growth::default() }
     }
@@ -187,7 +188,7 @@ impl Comparison {
         })
     }
 
-    pub(super) fn report(mut self) -> anyhow::Result<Report> {
+    pub(super) fn report(mut self) -> anyhow::Result<DiffReport> {
         if self.report.common_steps == 0 {
             let text = |side: &Side| {
                 side.steps.map_or("none".to_owned(), |(first, last)| format!("{first}..={last}"))

@@ -9,7 +9,7 @@ use sim_contract::{ParticleState, printable_line};
 
 /// The result, as printed.
 #[derive(Debug, Default, Serialize)]
-pub(crate) struct Report {
+pub(crate) struct DiffReport {
     /// The part that came apart first: "scene", "commands", "state", or null.
     pub(super) first: Option<&'static str>,
     /// First and last step that both files have.
@@ -72,7 +72,7 @@ impl fmt::Display for StateDifference {
     }
 }
 
-impl fmt::Display for Report {
+impl fmt::Display for DiffReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.scene {
             None => writeln!(f, "scene       same")?,

@@ -46,7 +46,7 @@ impl DataFormat {
 
 /// The result, as printed.
 #[derive(Debug, Serialize)]
-pub(super) struct Written {
+pub(super) struct WrittenExport {
     /// The file or the folder.
     target: String,
     file_count: usize,
@@ -72,10 +72,10 @@ pub(super) fn write(
     format: DataFormat,
     target: &Path,
     existing: Existing,
-) -> anyhow::Result<Written> {
+) -> anyhow::Result<WrittenExport> {
     let mut files = WrittenFiles::new(existing);
     match write_files(snapshots, format, target, &mut files) {
-        Ok(()) => Ok(Written::new(snapshots, target, files.paths().len())),
+        Ok(()) => Ok(WrittenExport::new(snapshots, target, files.paths().len())),
         Err(error) => {
             files.remove();
             Err(error)
@@ -106,7 +106,7 @@ fn write_files(
     }
 }
 
-impl Written {
+impl WrittenExport {
     pub(super) fn new(snapshots: &Snapshots<'_>, target: &Path, file_count: usize) -> Self {
         Self {
             target: output::path_text(target),
@@ -123,7 +123,7 @@ impl Written {
     }
 }
 
-impl fmt::Display for Written {
+impl fmt::Display for WrittenExport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { target, snapshot_count, first_step, last_step, frames, .. } = self;
         let Some(Resampling { frames_per_s, frame_count, interpolated_count }) = frames else {

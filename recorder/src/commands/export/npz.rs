@@ -60,8 +60,8 @@ struct ForceColumn {
     number_type: &'static str,
     /// Numbers per row. One number has no axis of its own.
     width: usize,
-    rows: fn(&Survey) -> usize,
-    append: fn(&Survey, &ForcesRow, &mut Vec<u8>),
+    rows: fn(&ArraySurvey) -> usize,
+    append: fn(&ArraySurvey, &ForcesRow, &mut Vec<u8>),
 }
 
 const FORCE_COLUMNS: [ForceColumn; 6] = [
@@ -133,7 +133,7 @@ fn append_vector(bytes: &mut Vec<u8>, vector: [PlainF32; 3]) {
 
 /// The commands, and the numbers of rows of the forces.
 #[derive(Default)]
-struct Survey {
+struct ArraySurvey {
     /// The outcomes of the steps from the first to the last snapshot.
     commands: Vec<OutcomeRow>,
     has_forces: bool,
@@ -143,7 +143,7 @@ struct Survey {
     fixed: BTreeSet<u32>,
 }
 
-impl Survey {
+impl ArraySurvey {
     fn read(snapshots: &Snapshots<'_>) -> anyhow::Result<Self> {
         let mut survey = Self::default();
         snapshots.for_each(|state| {
@@ -179,7 +179,7 @@ pub(crate) fn write(snapshots: &Snapshots<'_>, out: &mut dyn Write) -> anyhow::R
             state.particles.iter().for_each(|particle| append(particle, bytes));
         })?;
     }
-    let survey = Survey::read(snapshots)?;
+    let survey = ArraySurvey::read(snapshots)?;
     archive.add_commands(&survey.commands)?;
     if survey.has_forces {
         let fixed: Vec<_> = survey.fixed.iter().copied().collect();

@@ -11,21 +11,21 @@ use recording::pictures::{
 };
 use serde::Serialize;
 
-use super::data::Written;
+use super::data::WrittenExport;
 use super::files::{Target, WrittenFiles};
 use super::snapshots::Snapshots;
 use crate::cli::output;
 
 /// The times of the frames of an animation.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Pace {
+pub(super) struct FramePace {
     /// Wall-clock time of a frame.
     pub(super) frame_time: Duration,
     /// Simulated time that passes within it. `None` shows each frame for this time, whenever it was recorded.
     pub(super) period: Option<Duration>,
 }
 
-impl Pace {
+impl FramePace {
     /// Returns how long each frame is shown, from the simulated times of the frames in s. Frames that are
     /// missing in the recording leave the one before them standing.
     pub(super) fn delays(self, times_s: &[f64]) -> Vec<Duration> {
@@ -69,10 +69,10 @@ pub(super) fn draw(
 pub(super) fn animate(
     snapshots: &Snapshots<'_>,
     options: PictureOptions,
-    pace: Pace,
+    pace: FramePace,
     path: &Path,
     existing: Existing,
-) -> anyhow::Result<Written> {
+) -> anyhow::Result<WrittenExport> {
     let mut files = WrittenFiles::new(existing);
     files.add_streamed(path, |out| {
         let times_s: Vec<_> = snapshots.steps.iter().map(|step| snapshots.time_s(*step)).collect();
@@ -83,7 +83,7 @@ pub(super) fn animate(
         })?;
         animation.finish()
     })?;
-    Ok(Written::new(snapshots, path, files.paths().len()))
+    Ok(WrittenExport::new(snapshots, path, files.paths().len()))
 }
 
 /// Reads the selected states once, so that one camera shows all of them.

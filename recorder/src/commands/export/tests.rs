@@ -183,7 +183,7 @@ fn the_frames_of_an_animation_are_the_pictures() {
     let path = std::env::temp_dir().join(format!("recorder-apng-{}.png", std::process::id()));
     // Half as fast as the run.
     let frame_time = Duration::from_millis(20);
-    let pace = Pace { frame_time, period: Some(frame_time / 2) };
+    let pace = FramePace { frame_time, period: Some(frame_time / 2) };
     let rate_hz = with_snapshots(&file, Some(&[0, 20, 23]), |snapshots| {
         pictures::animate(snapshots, OPTIONS, pace, &path, Existing::Refuse).unwrap();
         f64::from(snapshots.run.rate_hz)
@@ -461,7 +461,7 @@ fn an_option_that_the_format_ignores_is_refused() {
 #[test]
 fn an_animation_keeps_the_pace_of_a_sparse_recording() {
     let pace = |line| parse(line).unwrap().pace();
-    let delays_ms = |pace: Pace| {
+    let delays_ms = |pace: FramePace| {
         let delays = pace.delays(&[0.0, 0.1, 0.5, 0.54]);
         delays.iter().map(|delay| (delay.as_secs_f64() * 1000.0).round()).collect::<Vec<_>>()
     };

@@ -198,7 +198,7 @@ impl fmt::Display for Info {
 }
 
 /// The report on a recording so far.
-struct Survey {
+struct InfoSurvey {
     info: Info,
     gaps: GapCounter,
     timing: TimingCollector,
@@ -216,7 +216,7 @@ pub(super) fn inspect<R: Read>(
     file: String,
     size_bytes: u64,
 ) -> anyhow::Result<(Info, LogEnd)> {
-    let mut survey = Survey::new(log, Info::new(log.run(), file, size_bytes))?;
+    let mut survey = InfoSurvey::new(log, Info::new(log.run(), file, size_bytes))?;
     while let Some(logged) = log.next_message()? {
         survey.add(&logged);
     }
@@ -225,7 +225,7 @@ pub(super) fn inspect<R: Read>(
     Ok((survey.finish(log.run(), log.closing(), &end), end))
 }
 
-impl Survey {
+impl InfoSurvey {
     fn new<R: Read>(log: &LogReader<R>, mut info: Info) -> anyhow::Result<Self> {
         info.messages = Topic::ALL.map(|topic| (topic.name(), 0)).into();
         let selection = log.selection();

@@ -29,12 +29,12 @@ pub(super) enum Request {
     Step(u64),
     Rate(f64),
     /// Continues at another place, as a new run.
-    Seek(Target),
+    Seek(SeekTarget),
 }
 
 /// A place to continue at.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Target {
+pub(super) enum SeekTarget {
     /// A step of the recorded run, or the last recorded one before it.
     Step(u64),
     /// A number of steps back in the recorded run.
@@ -56,10 +56,10 @@ impl Request {
             Action::Step { count: 0 } => return Err(Reason::OutOfRange),
             Action::Step { count } => Self::Step(count.into()),
             Action::Rewind { to_step: Some(step), back_steps: None } => {
-                Self::Seek(Target::Step(step))
+                Self::Seek(SeekTarget::Step(step))
             }
             Action::Rewind { to_step: None, back_steps: Some(count) } => {
-                Self::Seek(Target::BackSteps(count.into()))
+                Self::Seek(SeekTarget::BackSteps(count.into()))
             }
             Action::Set { parameter, value, constraint_kind, block, collider } => {
                 if Parameter::from_name(parameter.as_str()) != Some(Parameter::TimeScale) {
@@ -236,8 +236,8 @@ mod tests {
             (Action::Pause, Ok(Request::Pause)),
             (Action::Step { count: 2 }, Ok(Request::Step(2))),
             (Action::Step { count: 0 }, Err(Reason::OutOfRange)),
-            (rewind(Some(480), None), Ok(Request::Seek(Target::Step(480)))),
-            (rewind(None, Some(9)), Ok(Request::Seek(Target::BackSteps(9)))),
+            (rewind(Some(480), None), Ok(Request::Seek(SeekTarget::Step(480)))),
+            (rewind(None, Some(9)), Ok(Request::Seek(SeekTarget::BackSteps(9)))),
             (set("time_scale", 0.5), Ok(Request::Rate(0.5))),
             (set("time_scale", 0.01), Ok(Request::Rate(0.01))),
             (set("time_scale", 0.1), Ok(Request::Rate(0.1))),

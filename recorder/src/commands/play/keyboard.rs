@@ -16,7 +16,7 @@ use signal_hook::iterator::{Handle, Signals};
 use sim_contract::Stop;
 use sim_contract::clock::SECOND_NS;
 
-use super::control::{Control, Request, Target};
+use super::control::{Control, Request, SeekTarget};
 
 /// Most bytes to read at once.
 const READ_SIZE_BYTES: usize = 64;
@@ -237,12 +237,12 @@ impl Key {
             Self::Space => Request::Pause,
             Self::Period | Self::Comma if !is_paused => Request::Pause,
             Self::Period => Request::Step(1),
-            Self::Comma => Request::Seek(Target::Previous),
-            Self::Right => Request::Seek(Target::By(SECOND)),
-            Self::Left => Request::Seek(Target::By(-SECOND)),
+            Self::Comma => Request::Seek(SeekTarget::Previous),
+            Self::Right => Request::Seek(SeekTarget::By(SECOND)),
+            Self::Left => Request::Seek(SeekTarget::By(-SECOND)),
             Self::Up => Request::Rate(RATES.into_iter().find(|rate| *rate > control.rate)?),
             Self::Down => Request::Rate(RATES.into_iter().rfind(|rate| *rate < control.rate)?),
-            Self::Digit(digit) => Request::Seek(Target::Percent(digit * 10)),
+            Self::Digit(digit) => Request::Seek(SeekTarget::Percent(digit * 10)),
             Self::Quit | Self::Other => return None,
         })
     }
@@ -280,12 +280,12 @@ mod keys_tests {
         let mut control = Control::new(false, 1.0);
         assert_eq!(Key::Space.request(control), Some(Request::Pause));
         assert_eq!(Key::Period.request(control), Some(Request::Pause));
-        assert_eq!(Key::Left.request(control), Some(Request::Seek(Target::By(-1_000_000_000))));
-        assert_eq!(Key::Digit(4).request(control), Some(Request::Seek(Target::Percent(40))));
+        assert_eq!(Key::Left.request(control), Some(Request::Seek(SeekTarget::By(-1_000_000_000))));
+        assert_eq!(Key::Digit(4).request(control), Some(Request::Seek(SeekTarget::Percent(40))));
         control.set_paused(true);
         assert_eq!(Key::Space.request(control), Some(Request::Resume));
         assert_eq!(Key::Period.request(control), Some(Request::Step(1)));
-        assert_eq!(Key::Comma.request(control), Some(Request::Seek(Target::Previous)));
+        assert_eq!(Key::Comma.request(control), Some(Request::Seek(SeekTarget::Previous)));
     }
 
     #[test]

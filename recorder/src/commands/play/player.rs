@@ -6,7 +6,7 @@ use recording::Frame;
 use sim_contract::clock::{SECOND_NS, monotonic_ns, sleep_until};
 use sim_contract::{Action, Command, Endpoint, Owner, Reason, ReceivedCommand, Stop};
 
-use super::control::{Control, Pace, Request, Target};
+use super::control::{Control, Pace, Request, SeekTarget};
 use super::keyboard::{Key, Keyboard};
 use super::lockstep::Lockstep;
 use super::playlist::{Place, Playlist};
@@ -301,19 +301,19 @@ impl Player {
         Ok(Ok(None))
     }
 
-    fn find(&mut self, target: Target, step: u64) -> anyhow::Result<Result<Place, Reason>> {
+    fn find(&mut self, target: SeekTarget, step: u64) -> anyhow::Result<Result<Place, Reason>> {
         let Plan { start_ns, end_ns, .. } = self.plan;
         let place = match target {
-            Target::Step(step) => self.playlist.place_of(step),
-            Target::BackSteps(count) => {
+            SeekTarget::Step(step) => self.playlist.place_of(step),
+            SeekTarget::BackSteps(count) => {
                 step.checked_sub(count).and_then(|step| self.playlist.place_of(step))
             }
-            Target::Previous => Some(self.playlist.place_before(step)?),
-            Target::By(ns) => {
+            SeekTarget::Previous => Some(self.playlist.place_before(step)?),
+            SeekTarget::By(ns) => {
                 let time_ns = self.playlist.time_ns(step).saturating_add_signed(ns);
                 Some(self.playlist.place_at(time_ns.clamp(start_ns, end_ns)))
             }
-            Target::Percent(percent) => {
+            SeekTarget::Percent(percent) => {
                 let time_ns = u128::from(end_ns - start_ns) * u128::from(percent) / 100;
                 let time_ns = u64::try_from(time_ns).unwrap_or(u64::MAX);
                 Some(self.playlist.place_at(start_ns.saturating_add(time_ns)))

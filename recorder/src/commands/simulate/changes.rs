@@ -62,7 +62,7 @@ pub(super) fn parse_setting(text: &str) -> Result<TimedCommand, String> {
 
 /// The scene, steps, states and commands of a recording.
 #[derive(Debug)]
-pub(super) struct Survey {
+pub(super) struct ChangesSurvey {
     scene: Scene,
     /// The first state with particles and a keyframe.
     first_state: Option<Start>,
@@ -73,7 +73,7 @@ pub(super) struct Survey {
     end: Option<LogEnd>,
 }
 
-impl Survey {
+impl ChangesSurvey {
     fn new(scene: Scene) -> Self {
         let (states, outcomes) = (Vec::new(), Vec::new());
         Self { scene, first_state: None, states, last_step: 0, outcomes, end: None }
@@ -181,7 +181,7 @@ pub(super) struct Changed {
 impl Changed {
     pub(super) fn new(
         path: &Path,
-        survey: Survey,
+        survey: ChangesSurvey,
         changes: Changes,
         stop: &Stop,
     ) -> anyhow::Result<Self> {
@@ -241,7 +241,7 @@ fn state_at<R: std::io::Read>(
 }
 
 /// The commands after the start. A recording ends with a load, so none is repeated.
-fn commands(survey: &Survey, changes: Changes, outcome_count: u64) -> Vec<TimedCommand> {
+fn commands(survey: &ChangesSurvey, changes: Changes, outcome_count: u64) -> Vec<TimedCommand> {
     let dropped: BTreeSet<_> = changes.dropped.into_iter().collect();
     let recorded = survey.outcomes.iter().filter(|row| {
         row.index >= outcome_count

@@ -14,7 +14,7 @@ use crate::log::read_error::ReadError;
 use crate::log::scanner::chunk::{Chunk, ChunkContent, InnerRecords};
 use crate::log::scanner::limits::RECORD_HEADER_SIZE_BYTES;
 use crate::log::scanner::window::Window;
-use crate::log::scanner::{Checksum, LongAttachment, Part, RecordScanner, Section};
+use crate::log::scanner::{Checksum, FilePart, LongAttachment, RecordScanner, SectionChecksum};
 use crate::log::topic::Topic;
 
 /// Bytes between two calls of the progress callback.
@@ -77,26 +77,26 @@ struct Check {
 
 impl Check {
     /// Checks a part of the file.
-    fn add(&mut self, part: Part<'_>, chunks: &mut ChunkContent) -> Result<(), ReadError> {
+    fn add(&mut self, part: FilePart<'_>, chunks: &mut ChunkContent) -> Result<(), ReadError> {
         match part {
-            Part::Record { byte, opcode, body, section } => {
+            FilePart::Record { byte, opcode, body, section } => {
                 self.end_message_indexes(byte, opcode);
                 self.add_record(byte, opcode, body)?;
                 if let Some(section) = section {
                     self.end_section(byte, opcode, section);
                 }
             }
-            Part::Chunk { byte, size_bytes, chunk } => {
+            FilePart::Chunk { byte, size_bytes, chunk } => {
                 self.end_message_indexes(byte, op::CHUNK);
                 self.add_chunk(byte, size_bytes, &chunk, chunks);
             }
-            Part::Skipped { opcode: op::CHUNK, .. } => {
+            FilePart::Skipped { opcode: op::CHUNK, .. } => {
                 return Err(self.head.no_run(&self.findings));
             }
-            Part::Skipped { byte, opcode } => {
+            FilePart::Skipped { byte, opcode } => {
                 self.not_checked(format!("the {} at byte {byte}", record_name(opcode)));
             }
-            Part::LongAttachment { attachment, checksum } => {
+            FilePart::LongAttachment { attachment, checksum } => {
                 let LongAttachment { byte, size_bytes, header, data } = attachment;
                 if checksum == Checksum::Wrong {
                     self.findings.add(byte, "attachment", WRONG_CHECKSUM);
@@ -106,16 +106,16 @@ impl Check {
                 }
                 self.places.add_attachment(byte, size_bytes, &header, data.end - data.start);
             }
-            Part::Damaged { bytes, cause } => {
+            FilePart::Damaged { bytes, cause } => {
                 let what = format!("{} bytes are damaged: {cause}", bytes.end - bytes.start);
                 self.findings.add(bytes.start, "damaged record", what);
                 self.mark_gap();
                 self.head.add_damage(bytes.end - bytes.start);
             }
-            Part::Truncated { byte } => {
+            FilePart::Truncated { byte } => {
                 self.findings.add(byte, "end of the file", "the file is truncated here");
             }
-            Part::AfterEnd { bytes } => {
+            FilePart::AfterEnd { bytes } => {
                 self.findings.add(bytes.start, "end of the file", after_end_text(&bytes));
             }
         }
@@ -303,7 +303,7 @@ impl Check {
     }
 
     /// Compares the checksum of a section, which a record ends.
-    fn end_section(&mut self, byte: u64, opcode: u8, section: Section) {
+    fn end_section(&mut self, byte: u64, opcode: u8, section: SectionChecksum) {
         let is_index = opcode == op::FOOTER;
         let name = if is_index { "index" } else { "data" };
         if section.saved == 0 {

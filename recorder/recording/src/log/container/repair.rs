@@ -26,7 +26,7 @@ use crate::log::run::{CLOSING_METADATA, Closing, SCENE_ATTACHMENT, header_librar
 use crate::log::scanner::chunk::{Chunk, ChunkContent, InnerRecords};
 use crate::log::scanner::limits::HEADER_RECORD_SIZE_BYTES_MAX;
 use crate::log::scanner::window::Window;
-use crate::log::scanner::{Checksum, LongAttachment, Part, RecordScanner};
+use crate::log::scanner::{Checksum, FilePart, LongAttachment, RecordScanner};
 use crate::log::topic::Topic;
 use crate::log::writer::WriteError;
 
@@ -70,10 +70,10 @@ pub fn repair_file<R: Read + Seek, W: Write>(
         }
         match scanner.next()? {
             None => break,
-            Some(Part::LongAttachment { attachment, checksum }) => {
+            Some(FilePart::LongAttachment { attachment, checksum }) => {
                 repair.add_long_attachment(&mut scanner, attachment, checksum)?;
             }
-            Some(Part::AfterEnd { bytes }) => {
+            Some(FilePart::AfterEnd { bytes }) => {
                 repair.after_end = Some(read_after_end(&mut scanner, &bytes)?);
             }
             Some(part) => repair.add(part, &mut chunks)?,
@@ -95,9 +95,9 @@ fn read_after_end<R: Read>(
         scanner.go_to(at);
         while let Some(part) = scanner.next()? {
             match part {
-                Part::Chunk { .. } => found.chunk_count += 1,
-                Part::Record { opcode: op::MESSAGE, .. } => found.message_count += 1,
-                Part::Record { opcode: op::MESSAGE_INDEX, body, .. } => {
+                FilePart::Chunk { .. } => found.chunk_count += 1,
+                FilePart::Record { opcode: op::MESSAGE, .. } => found.message_count += 1,
+                FilePart::Record { opcode: op::MESSAGE_INDEX, body, .. } => {
                     if let Ok(Record::MessageIndex(index)) =
                         mcap::parse_record(op::MESSAGE_INDEX, body)
                     {
@@ -105,7 +105,7 @@ fn read_after_end<R: Read>(
                     }
                 }
                 // A third file.
-                Part::AfterEnd { bytes } => begin = Some(bytes.start),
+                FilePart::AfterEnd { bytes } => begin = Some(bytes.start),
                 _ => {}
             }
         }
@@ -183,30 +183,30 @@ impl<W: Write> Repair<W> {
     }
 
     /// Adds a part of the input.
-    fn add(&mut self, part: Part<'_>, chunks: &mut ChunkContent) -> Result<(), RepairError> {
+    fn add(&mut self, part: FilePart<'_>, chunks: &mut ChunkContent) -> Result<(), RepairError> {
         match part {
-            Part::Record { byte, opcode, body, section } => {
+            FilePart::Record { byte, opcode, body, section } => {
                 self.add_record(byte, opcode, body)?;
                 if let Some(section) = section.filter(|_| opcode == op::DATA_END) {
                     self.has_wrong_checksum = section.is_wrong();
                     self.is_unexplained = section.is_wrong() && self.findings.count() == 0;
                 }
             }
-            Part::Chunk { .. } if self.section == Section::Index => {}
-            Part::Chunk { byte, size_bytes, chunk } => {
+            FilePart::Chunk { .. } if self.section == Section::Index => {}
+            FilePart::Chunk { byte, size_bytes, chunk } => {
                 self.add_chunk(byte, size_bytes, &chunk, chunks)?;
             }
-            Part::Skipped { opcode: op::CHUNK, .. } => {
+            FilePart::Skipped { opcode: op::CHUNK, .. } => {
                 return Err(self.file_head.no_run(&self.findings).into());
             }
             // The attachment is copied in pieces, the bytes are only counted.
-            Part::LongAttachment { .. } | Part::AfterEnd { .. } => {}
-            Part::Skipped { byte, opcode } => {
+            FilePart::LongAttachment { .. } | FilePart::AfterEnd { .. } => {}
+            FilePart::Skipped { byte, opcode } => {
                 self.lose(byte, record_name(opcode), "it is of another program")?;
                 // The opcode may be the damage.
                 self.begin_damage();
             }
-            Part::Damaged { bytes, cause } => {
+            FilePart::Damaged { bytes, cause } => {
                 let size_bytes = bytes.end - bytes.start;
                 let what = format!("{size_bytes} bytes are damaged: {cause}");
                 self.file_head.add_damage(size_bytes);
@@ -214,10 +214,10 @@ impl<W: Write> Repair<W> {
                 self.begin_damage();
             }
             // A killed recorder leaves whole records.
-            Part::Truncated { byte } if byte == self.size_bytes => {
+            FilePart::Truncated { byte } if byte == self.size_bytes => {
                 self.findings.add_index(byte, "end of the file", "the file has no end");
             }
-            Part::Truncated { byte } => {
+            FilePart::Truncated { byte } => {
                 self.lose(byte, "end of the file", "the file is truncated here")?;
             }
         }
@@ -339,7 +339,7 @@ impl<W: Write> Repair<W> {
         Ok(())
     }
 
-    /// Sets the header of the output: that of the recorder of the run. The one of the input has no checksum.
+    /// Rebuilds the file header from the run metadata, because no checksum protects the input's header.
     fn restore_header(&mut self) {
         let Some(content) = &self.file_head.content else { return };
         let own = header_library(&content.run().recorder_version);

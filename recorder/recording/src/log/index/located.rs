@@ -8,7 +8,7 @@ use crate::log::input_file::FileSource;
 use crate::log::read_error::{LogEnd, ReadError};
 use crate::log::scanner::limits::RECORD_HEADER_SIZE_BYTES;
 use crate::log::scanner::window::Window;
-use crate::log::scanner::{Part, RecordScanner, split_header};
+use crate::log::scanner::{FilePart, RecordScanner, split_header};
 
 /// Most chunks of a file. At the usual chunk size this is 1 TB. Their index takes less than 200 MB
 /// of memory.
@@ -65,8 +65,8 @@ pub(super) fn read_index(
     let mut chunks: Vec<LocatedChunk> = Vec::new();
     loop {
         match scanner.next()? {
-            Some(Part::Record { opcode: op::FOOTER, .. }) => return Ok(Some(chunks)),
-            Some(Part::Record { opcode: op::CHUNK_INDEX, body, .. }) => {
+            Some(FilePart::Record { opcode: op::FOOTER, .. }) => return Ok(Some(chunks)),
+            Some(FilePart::Record { opcode: op::CHUNK_INDEX, body, .. }) => {
                 let Ok(Record::ChunkIndex(index)) = mcap::parse_record(op::CHUNK_INDEX, body)
                 else {
                     return Ok(None);
@@ -84,7 +84,7 @@ pub(super) fn read_index(
                 }
                 chunks.push(chunk);
             }
-            Some(Part::Record { .. } | Part::Skipped { .. }) => {}
+            Some(FilePart::Record { .. } | FilePart::Skipped { .. }) => {}
             _ => return Ok(None),
         }
     }

@@ -10,13 +10,13 @@ use crate::log::read_error::{LogEnd, ReadError};
 use crate::log::scanner::chunk::{ChunkContent, InnerRecord, InnerRecords};
 use crate::log::scanner::limits::{RECORD_HEADER_SIZE_BYTES, SizeLimits, TEXT_SIZE_BYTES_MAX};
 use crate::log::scanner::window::Window;
-use crate::log::scanner::{Part, RecordScanner, Section};
+use crate::log::scanner::{FilePart, RecordScanner, SectionChecksum};
 
 /// Reads the records one by one and remembers how far the file is intact.
 pub(in crate::log) struct RecordReader<R> {
     scanner: RecordScanner<R>,
     content: ChunkContent,
-    chunk: Option<OpenChunk>,
+    chunk: Option<ChunkPlace>,
     /// End of the last intact record, or of the chunk that contains it.
     intact_count: u64,
     /// The end of the file, once it is reached.
@@ -24,7 +24,7 @@ pub(in crate::log) struct RecordReader<R> {
 }
 
 /// The chunk that is being read.
-struct OpenChunk {
+struct ChunkPlace {
     /// The data in the file.
     data: Range<u64>,
     /// Position of the next record in the content.
@@ -81,7 +81,7 @@ impl<R: Read> RecordReader<R> {
             }
             let end = match self.scanner.next()? {
                 None => Ok(LogEnd::Complete),
-                Some(Part::Record { opcode, body, section, .. }) => {
+                Some(FilePart::Record { opcode, body, section, .. }) => {
                     match parse(opcode, body, section) {
                         Ok(None) => continue,
                         Ok(Some(record)) => {
@@ -92,23 +92,23 @@ impl<R: Read> RecordReader<R> {
                         Err(cause) => Err(cause),
                     }
                 }
-                Some(Part::Chunk { size_bytes, chunk, .. }) => {
+                Some(FilePart::Chunk { size_bytes, chunk, .. }) => {
                     let end = byte + size_bytes as u64;
                     let data = end - chunk.data.len() as u64..end;
-                    self.chunk = Some(OpenChunk { data, offset: 0 });
+                    self.chunk = Some(ChunkPlace { data, offset: 0 });
                     match self.content.read(&chunk) {
                         Ok(()) => continue,
                         Err(cause) => Err(cause),
                     }
                 }
                 // One before the metadata of the run is not one of ours.
-                Some(Part::Skipped { opcode: opcode @ op::CHUNK, .. }) => {
+                Some(FilePart::Skipped { opcode: opcode @ op::CHUNK, .. }) => {
                     return read(Record::Unknown { opcode, data: (&[]).into() }, byte).map(Some);
                 }
-                Some(Part::LongAttachment { .. } | Part::Skipped { .. }) => continue,
-                Some(Part::Truncated { byte }) => Ok(LogEnd::Truncated { byte }),
-                Some(Part::Damaged { cause, .. }) => Err(cause),
-                Some(Part::AfterEnd { bytes }) => {
+                Some(FilePart::LongAttachment { .. } | FilePart::Skipped { .. }) => continue,
+                Some(FilePart::Truncated { byte }) => Ok(LogEnd::Truncated { byte }),
+                Some(FilePart::Damaged { cause, .. }) => Err(cause),
+                Some(FilePart::AfterEnd { bytes }) => {
                     self.intact_count = bytes.start;
                     Err("other bytes follow the end of the recording, such as a second file"
                         .to_owned())
@@ -122,8 +122,14 @@ impl<R: Read> RecordReader<R> {
 }
 
 /// Parses a record outside of chunks that a reader of messages uses. `Err` describes damage.
-fn parse(opcode: u8, body: &[u8], section: Option<Section>) -> Result<Option<Record<'_>>, String> {
-    if let Some(Section { saved, calculated }) = section.filter(|section| section.is_wrong()) {
+fn parse(
+    opcode: u8,
+    body: &[u8],
+    section: Option<SectionChecksum>,
+) -> Result<Option<Record<'_>>, String> {
+    if let Some(SectionChecksum { saved, calculated }) =
+        section.filter(|section| section.is_wrong())
+    {
         let error = match opcode {
             op::FOOTER => McapError::BadSummaryCrc { saved, calculated },
             _ => McapError::BadDataCrc { saved, calculated },

@@ -6,7 +6,7 @@ use mcap::records::op;
 
 /// A field of a record.
 #[derive(Debug, Clone, Copy)]
-enum Field {
+enum RecordField {
     /// A number of bytes.
     Bytes(usize),
     /// A text or data with a length of 32 bits before it.
@@ -22,8 +22,8 @@ enum Field {
 }
 
 /// Returns the fields of the records of a kind.
-fn fields(opcode: u8) -> &'static [Field] {
-    use Field::{Bytes, Data, Entries, Rest, Text, Texts};
+fn fields(opcode: u8) -> &'static [RecordField] {
+    use RecordField::{Bytes, Data, Entries, Rest, Text, Texts};
     match opcode {
         op::HEADER => &[Text, Text],
         op::SCHEMA => &[Bytes(2), Text, Text, Text],
@@ -62,25 +62,25 @@ impl<'a> Unread<'a> {
         Some(taken)
     }
 
-    fn skip(&mut self, field: Field) -> Option<()> {
+    fn skip(&mut self, field: RecordField) -> Option<()> {
         match field {
-            Field::Bytes(count) => self.take(count).map(drop),
-            Field::Text => self.part().map(drop),
-            Field::Texts => {
+            RecordField::Bytes(count) => self.take(count).map(drop),
+            RecordField::Text => self.part().map(drop),
+            RecordField::Texts => {
                 let mut list = Unread(self.part()?);
                 while !list.0.is_empty() {
                     list.part()?;
                 }
                 Some(())
             }
-            Field::Entries(size_bytes) => {
+            RecordField::Entries(size_bytes) => {
                 self.part().filter(|list| list.len() % size_bytes == 0).map(drop)
             }
-            Field::Data => {
+            RecordField::Data => {
                 let size_bytes = self.u64()?;
                 self.take(usize::try_from(size_bytes).ok()?).map(drop)
             }
-            Field::Rest => self.take(self.0.len()).map(drop),
+            RecordField::Rest => self.take(self.0.len()).map(drop),
         }
     }
 

@@ -67,11 +67,11 @@ impl ChunkReader {
     }
 
     /// Returns the steps of the snapshots in a chunk. Reads the chunk if it was never read.
-    pub(super) fn span(&mut self, chunk: usize) -> Result<Span, ReadError> {
+    pub(super) fn span(&mut self, chunk: usize) -> Result<ChunkSpan, ReadError> {
         if self.chunks.span(chunk).is_none() {
             self.digest(chunk)?;
         }
-        Ok(self.chunks.span(chunk).unwrap_or(Span::Empty))
+        Ok(self.chunks.span(chunk).unwrap_or(ChunkSpan::Empty))
     }
 
     /// Returns the particles of a snapshot, if the chunk has it.
@@ -184,12 +184,12 @@ pub(super) struct Chunks {
     by_topic: Vec<ChunkList>,
     tears: ChunkList,
     /// Steps of the snapshots in each chunk. `None` until the chunk is read.
-    spans: Vec<Option<Span>>,
+    spans: Vec<Option<ChunkSpan>>,
 }
 
 /// The steps of the snapshots in a chunk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Span {
+pub(super) enum ChunkSpan {
     Empty,
     Steps { first: u64, last: u64 },
 }
@@ -237,15 +237,15 @@ impl Chunks {
     }
 
     /// Returns the steps in a chunk, or `None` if it has not been read.
-    pub(super) fn span(&self, chunk: usize) -> Option<Span> {
+    pub(super) fn span(&self, chunk: usize) -> Option<ChunkSpan> {
         self.spans[chunk]
     }
 
     /// Stores the steps in a chunk.
     pub(super) fn set_span(&mut self, chunk: usize, steps: &[u64]) {
         self.spans[chunk] = Some(match (steps.first(), steps.last()) {
-            (Some(first), Some(last)) => Span::Steps { first: *first, last: *last },
-            _ => Span::Empty,
+            (Some(first), Some(last)) => ChunkSpan::Steps { first: *first, last: *last },
+            _ => ChunkSpan::Empty,
         });
     }
 }

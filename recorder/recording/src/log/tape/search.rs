@@ -1,12 +1,12 @@
 //! Finds the chunk of a step with few reads.
 
-use super::chunk_reader::{ChunkReader, Span};
+use super::chunk_reader::{ChunkReader, ChunkSpan};
 use crate::log::read_error::ReadError;
 use crate::log::topic::Topic;
 
 /// The first and the last recorded step.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct StepRange {
+pub(super) struct RecordedSteps {
     pub(super) first: u64,
     pub(super) last: u64,
 }
@@ -57,7 +57,7 @@ impl Bracket {
 pub(super) fn find(
     reader: &mut ChunkReader,
     step: u64,
-    range: StepRange,
+    range: RecordedSteps,
 ) -> Result<Option<SnapshotPosition>, ReadError> {
     let list = reader.chunks.with_topic(Topic::Particles).0;
     let mut bracket =
@@ -98,7 +98,7 @@ pub(super) fn first_and_last(
     let Some((place, _)) = first_with_steps(reader, &list)? else { return Ok(None) };
     let first = reader.digest(list[place])?.snapshots.clone();
     for chunk in list.iter().rev() {
-        if let Span::Steps { last, .. } = reader.span(*chunk)? {
+        if let ChunkSpan::Steps { last, .. } = reader.span(*chunk)? {
             return Ok(Some((first, last)));
         }
     }
@@ -109,10 +109,10 @@ pub(super) fn first_and_last(
 fn first_with_steps(
     reader: &mut ChunkReader,
     chunks: &[usize],
-) -> Result<Option<(usize, StepRange)>, ReadError> {
+) -> Result<Option<(usize, RecordedSteps)>, ReadError> {
     for (place, chunk) in chunks.iter().enumerate() {
-        if let Span::Steps { first, last } = reader.span(*chunk)? {
-            return Ok(Some((place, StepRange { first, last })));
+        if let ChunkSpan::Steps { first, last } = reader.span(*chunk)? {
+            return Ok(Some((place, RecordedSteps { first, last })));
         }
     }
     Ok(None)

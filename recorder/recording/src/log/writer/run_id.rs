@@ -14,7 +14,7 @@ use crate::log::read_error::ReadError;
 use crate::log::run::RUN_METADATA;
 use crate::log::scanner::limits::RECORD_HEADER_SIZE_BYTES;
 use crate::log::scanner::window::Window;
-use crate::log::scanner::{Part, RecordScanner};
+use crate::log::scanner::{FilePart, RecordScanner};
 
 /// Replaces the id, which has as many digits as before, and the checksum that covers it.
 ///
@@ -45,7 +45,7 @@ fn find_run_id(window: Window<FileSource>, id: &[u8]) -> Result<Option<u64>, Rea
     // The length of the value precedes it.
     let entry = [b"run_id", &[16, 0, 0, 0][..], id].concat();
     while let Some(part) = scanner.next()? {
-        if let Part::Record { byte, opcode: op::METADATA, body, .. } = part
+        if let FilePart::Record { byte, opcode: op::METADATA, body, .. } = part
             && let Ok(Record::Metadata(metadata)) = mcap::parse_record(op::METADATA, body)
             && metadata.name == RUN_METADATA
         {

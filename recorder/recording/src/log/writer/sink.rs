@@ -73,12 +73,12 @@ impl SinkState {
 
 /// Bytes of a chunk.
 #[derive(Debug)]
-enum Part {
+enum ChunkBytes {
     Bytes(Vec<u8>),
     Message(Arc<ParticleBuffer>),
 }
 
-impl Part {
+impl ChunkBytes {
     fn bytes(&self) -> &[u8] {
         match self {
             Self::Bytes(bytes) => bytes,
@@ -94,7 +94,7 @@ pub(super) struct ChunkSink<W> {
     out: W,
     state: SinkHandle,
     /// The bytes after those in the output.
-    parts: Vec<Part>,
+    parts: Vec<ChunkBytes>,
     /// Position in the file of the first part.
     begin: u64,
     /// Place within the first part to write to; `None` at the end.
@@ -135,7 +135,7 @@ impl<W: Write> ChunkSink<W> {
         }
         let mut state = self.state.lock();
         for part in self.parts.drain(..) {
-            if let Part::Message(buffer) = part {
+            if let ChunkBytes::Message(buffer) = part {
                 state.add_spare(buffer);
             }
         }
@@ -147,11 +147,11 @@ impl<W: Write> ChunkSink<W> {
         state.size_bytes += bytes.len() as u64;
         if let Some(buffer) = state.offered.take_if(|buffer| std::ptr::eq(buffer.message(), bytes))
         {
-            self.parts.push(Part::Message(buffer));
-        } else if let Some(Part::Bytes(last)) = self.parts.last_mut() {
+            self.parts.push(ChunkBytes::Message(buffer));
+        } else if let Some(ChunkBytes::Bytes(last)) = self.parts.last_mut() {
             last.extend_from_slice(bytes);
         } else {
-            self.parts.push(Part::Bytes(bytes.to_vec()));
+            self.parts.push(ChunkBytes::Bytes(bytes.to_vec()));
         }
     }
 
@@ -164,7 +164,7 @@ impl<W: Write> ChunkSink<W> {
 impl<W: Write> Write for ChunkSink<W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         match (&mut self.place, self.parts.first_mut()) {
-            (Some(place), Some(Part::Bytes(first))) => {
+            (Some(place), Some(ChunkBytes::Bytes(first))) => {
                 let target = first.get_mut(*place..*place + bytes.len());
                 target.ok_or(io::ErrorKind::InvalidInput)?.copy_from_slice(bytes);
                 *place += bytes.len();
