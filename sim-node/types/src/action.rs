@@ -7,7 +7,7 @@ mod words;
 use serde::{Deserialize, Serialize};
 
 use crate::json::hash;
-use crate::json::non_finite::{number, optional_number, rotation, vector};
+use crate::json::{number, optional_number, rotation, vector};
 use crate::parameter::{ParameterValue, Part};
 use crate::path_part::{PathError, PathPart, PathPoint, check_path};
 use crate::suggestion::did_you_mean;
@@ -467,7 +467,7 @@ impl Action {
     #[doc(hidden)]
     #[allow(clippy::too_many_lines, reason = "a sample of each action")]
     pub fn samples() -> Vec<Self> {
-        use crate::constraint_kind::ConstraintKind;
+        use crate::kinds::ConstraintKind;
 
         let target = [0.1, -2.0, 3.5];
         let delta = [0.0, -0.0, 1e-9];
@@ -540,7 +540,7 @@ impl Action {
 
 #[cfg(test)]
 mod tests {
-    use crate::constraint_kind::ConstraintKind;
+    use crate::kinds::ConstraintKind;
 
     use super::*;
 

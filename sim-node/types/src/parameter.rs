@@ -4,10 +4,10 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use crate::constraint_kind::ConstraintKind;
-use crate::json::non_finite::{number, vector};
-use crate::method::Method;
-use crate::range::NumberRange;
+use crate::json::{number, vector};
+use crate::kinds::ConstraintKind;
+use crate::kinds::Method;
+use crate::limits::NumberRange;
 use crate::suggestion::nearest;
 
 /// A parameter that can change while a scene runs. Its number is its index in [`PARAMETERS`], which describes it.

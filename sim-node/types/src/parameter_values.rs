@@ -6,8 +6,8 @@ use std::fmt;
 use serde::de::{self, Deserialize, Deserializer, IgnoredAny, MapAccess, Visitor};
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
-use crate::constraint_kind::ConstraintKind;
-use crate::json::non_finite::number;
+use crate::json::number;
+use crate::kinds::ConstraintKind;
 use crate::parameter::{
     OffMeaning, PARAMETERS, Parameter, ParameterInfo, ParameterValue, Part, Parts, ValueForm,
 };

@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use crate::json::non_finite::{double, rotation, vector};
+use crate::json::{double, rotation, vector};
 use crate::limits::{MOTION_POINTS_MAX, OVER_S_MAX};
 
 /// A point of a motion.

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use crate::constraint_kind::ConstraintKind;
+use crate::kinds::ConstraintKind;
 use crate::names::names;
 
 /// Object that a command `follow` moves.
