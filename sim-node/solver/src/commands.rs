@@ -8,17 +8,15 @@ pub(crate) mod preparation;
 
 use glam::Vec3;
 use sim_types::{
-    Affects, ConstraintKind, MovedObject, Parameter, ParameterValue, Part, ParticleFlags, Reason,
-    Setting,
+    Action, Affects, ConstraintKind, MovedObject, Parameter, ParameterValue, Part, ParticleFlags,
+    Reason, Setting,
 };
 
-use crate::checks::{check_finite, is_near};
 use crate::contacts::bodies::driven_body::BodyMotion;
 use crate::frame::{Frame, Pose};
 use crate::solver::{Overfull, Solver};
 use crate::step::drive::{ActiveGrab, GRAB_HORIZON_S};
 use cut::Sphere;
-use moves::check_over;
 
 /// A request to drive a particle to a target.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -172,19 +170,13 @@ impl Solver {
     /// # Errors
     /// A number is not finite or out of range.
     pub fn push(&mut self, push: Push) -> Result<(), Reason> {
-        self.check_sphere(&push.sphere)?;
-        check_finite(&push.delta)?;
-        check_finite(push.limit.as_slice())?;
-        let limit = push.limit.unwrap_or(f32::MAX);
-        let is_in_plane = !self.is_planar || push.delta[2] == 0.0;
-        if !is_in_plane || limit < 0.0 {
-            return Err(Reason::OutOfRange);
-        }
-        let delta = push.delta.map(|axis| axis.clamp(-limit, limit));
-        if !is_near(&delta) {
-            return Err(Reason::OutOfRange);
-        }
-        let [x, y, z] = delta.map(|axis| axis * self.settings.rate_hz as f32);
+        self.assert_whole();
+        let Push { sphere: Sphere { center, radius }, delta, limit } = push;
+        Action::Push { center, radius, delta, limit }.validate()?;
+        self.check_in_plane(&[center, delta])?;
+        let limit = limit.unwrap_or(f32::MAX);
+        let rate_hz = self.settings.rate_hz as f32;
+        let [x, y, z] = delta.map(|axis| axis.clamp(-limit, limit) * rate_hz);
         for state in &mut self.particles.states {
             if state.inverse_mass != 0.0 && push.sphere.contains(Vec3::from_array(state.position)) {
                 state.velocity = [x, y, z];
@@ -206,8 +198,20 @@ impl Solver {
         pose: Pose,
         motion: &BodyMotion,
     ) -> Result<(), Reason> {
+        let Pose { translation, rotation } = pose;
+        let BodyMotion { velocity, angular_velocity, force, torque } = *motion;
+        Action::DriveBody {
+            collider,
+            translation,
+            rotation,
+            velocity,
+            angular_velocity,
+            force,
+            torque,
+        }
+        .validate()?;
         let frame = Frame::check(&pose, self.context())?;
-        motion.check(self.is_planar)?;
+        motion.check_in_plane(self.is_planar)?;
         let dt = self.step_length();
         let driven = self.colliders.get_mut(collider as usize);
         driven.ok_or(Reason::UnknownCollider)?.drive(frame, motion, dt)
@@ -236,6 +240,7 @@ impl Solver {
     /// # Errors
     /// Those of [`Self::set`], or the parameter has no values for this part.
     pub fn set_for(&mut self, name: &str, value: ParameterValue, part: Part) -> Result<(), Reason> {
+        Action::set(name, value).validate()?;
         // Taken out meanwhile, because the context borrows the rest.
         let mut parameters = std::mem::take(&mut self.parameters);
         let thickness = parameters.contact_thickness();
@@ -276,10 +281,15 @@ impl Solver {
     }
 
     fn check_target(&self, grab: &Grab) -> Result<(), Reason> {
-        check_finite(&grab.target)?;
-        check_over(grab.over_s)?;
-        let is_in_plane = !self.is_planar || grab.target[2] == 0.0;
-        if is_near(&grab.target) && is_in_plane { Ok(()) } else { Err(Reason::OutOfRange) }
+        let Grab { particle, target, over_s } = *grab;
+        Action::Grab { particle, target, over_s }.validate()?;
+        self.check_in_plane(&[target])
+    }
+
+    /// Checks that points and displacements of a planar scene stay in the plane.
+    pub(crate) fn check_in_plane(&self, vectors: &[[f32; 3]]) -> Result<(), Reason> {
+        let is_in_plane = !self.is_planar || vectors.iter().all(|vector| vector[2] == 0.0);
+        if is_in_plane { Ok(()) } else { Err(Reason::OutOfRange) }
     }
 
     /// Position of a particle's grab in the list, or the position where it belongs. The list ascends by particle.

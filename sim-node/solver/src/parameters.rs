@@ -8,7 +8,7 @@ use sim_types::{
     ParameterValues, Part, Parts, Reason, Setting,
 };
 
-use crate::checks::{Context, check_finite};
+use crate::checks::Context;
 use crate::constraints::bends::Bend;
 use crate::scene::definition::Scene;
 use crate::scene::definition::element::Limits;
@@ -166,7 +166,6 @@ impl Parameters {
         context: Context<'_>,
     ) -> Result<Affects, Reason> {
         let info = Parameter::from_name(name).ok_or(Reason::UnknownParameter)?.info();
-        check_finite(value.numbers())?;
         let is_of_other_method = info.method.is_some_and(|method| method != context.method);
         let has_parts = match info.parts {
             Parts::None | Parts::Kinds => true,

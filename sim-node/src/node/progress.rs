@@ -38,7 +38,6 @@ impl Progress {
         match control {
             Control::Pause => (self.is_paused, self.steps_due) = (true, 0),
             Control::Resume => (self.is_paused, self.steps_due) = (false, 0),
-            Control::Step { count: 0 } => return Err(Reason::OutOfRange),
             Control::Step { count } if self.is_paused => self.steps_due += u64::from(count),
             Control::TimeScale(scale) => self.time_scale = f64::from(scale),
             Control::Mark => {}
@@ -84,7 +83,6 @@ mod tests {
         let mut apply = |control| now.apply(Applied::Control(control)).map(|()| now);
         assert_eq!(apply(Control::Step { count: 3 }), Err(Reason::NoEffectHere));
         assert_eq!(apply(Control::Pause), Ok(progress(true, 0, false)));
-        assert_eq!(apply(Control::Step { count: 0 }), Err(Reason::OutOfRange));
         assert_eq!(apply(Control::Step { count: 3 }), Ok(progress(true, 3, false)));
         assert_eq!(apply(Control::Pause), Ok(progress(true, 0, false)), "it cancels the steps");
         assert_eq!(apply(Control::Resume), Ok(progress(false, 0, false)));

@@ -8,14 +8,16 @@ use serde::{Deserialize, Serialize};
 
 use crate::json::hash;
 use crate::json::{number, optional_number, rotation, vector};
-use crate::parameter::{ParameterValue, Part};
+use crate::limits::NumberRange;
+use crate::parameter::{Parameter, ParameterValue, Part};
 use crate::path_part::{PathError, PathPart, PathPoint, check_path};
+use crate::reason::Reason;
 use crate::suggestion::did_you_mean;
 use crate::text::Text;
 
 use field::{
     CONTENTS, FLAG, FieldReader, FieldType, FieldWriter, HASH, KIND, LENGTH, LONG, OBJECT, POINT,
-    ROTATION, SECONDS, VALUE, WHOLE, text, three,
+    ROTATION, SECONDS, VALUE, WHOLE, accept, check_finite, three, words,
 };
 pub use field::{FieldForm, FieldInfo};
 use words::kind_or_all;
@@ -24,8 +26,11 @@ pub use words::{KindFilter, MovedObject, RestoreContents};
 /// Default time in which a grabbed particle reaches its target, in seconds: one frame at 60 Hz.
 pub const GRAB_OVER_S_DEFAULT: f32 = 1.0 / 60.0;
 
+/// Default of a vector, in words.
+const ZERO: &str = "0 0 0";
+
 /// A row of the table of actions.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ActionInfo {
     /// Number on the wire.
     pub number: u32,
@@ -115,6 +120,14 @@ macro_rules! actions {
                 }
             }
 
+            fn check_fields(&self) -> Result<(), Reason> {
+                match self {
+                    $(Self::$variant $({ $($field),+ })? => { $($($field.check(&$info)?;)+)? })+
+                    Self::Unknown { .. } => return Err(Reason::NoEffectHere),
+                }
+                Ok(())
+            }
+
             fn write(&self, writer: &mut FieldWriter<'_>) {
                 match self {
                     $(Self::$variant $({ $($field),+ })? => { $($($field.write(writer);)+)? })+
@@ -144,7 +157,7 @@ actions! {
         /// Index of the particle.
         particle: u32 = WHOLE,
     }
-    /// Grabs a particle and moves it along a straight line to a target.
+    /// Grabs a particle, which moves along a straight line to a target.
     Grab = 3 "grab", "coordinates within 1e7, z 0 in 2-D, over 0 to 3600 s" {
         /// Index of the particle.
         particle: u32 = WHOLE,
@@ -153,7 +166,7 @@ actions! {
         target: [f32; 3] = POINT,
         /// Time to the target in seconds, 0..=3600, rounded up to whole steps.
         #[serde(with = "number", default = "grab_over_s_default")]
-        over_s: f32 = SECONDS.optional(),
+        over_s: f32 = SECONDS.optional("1/60"),
     }
     /// Sets a new target for a particle that this client has grabbed.
     Move = 4 "move", "coordinates within 1e7, z 0 in 2-D, over 0 to 3600 s" {
@@ -164,7 +177,7 @@ actions! {
         target: [f32; 3] = POINT,
         /// Time to the target in seconds, 0..=3600, rounded up to whole steps.
         #[serde(with = "number", default = "grab_over_s_default")]
-        over_s: f32 = SECONDS.optional(),
+        over_s: f32 = SECONDS.optional("1/60"),
     }
     /// Releases a grabbed particle with the velocity of its last motion.
     Release = 5 "release" {
@@ -172,7 +185,7 @@ actions! {
         particle: u32 = WHOLE,
         /// Releases the grab of any client, not only one of this client.
         #[serde(default, skip_serializing_if = "is_false")]
-        force: bool = FLAG.optional(),
+        force: bool = FLAG.optional(""),
     }
     /// Pauses the node at this boundary.
     Pause = 6 "pause"
@@ -181,7 +194,7 @@ actions! {
     /// Makes a paused node perform `count` steps.
     Step = 8 "step", "1 or more" {
         /// Number of steps, 1 or more.
-        count: u32 = WHOLE,
+        count: u32 = WHOLE.nonzero(),
     }
     /// Restores the initial state as the state of the next step. The step number continues.
     Reset = 9 "reset"
@@ -195,10 +208,10 @@ actions! {
         radius: f32 = LENGTH,
         /// Displacement of the particles in the next step, in m.
         #[serde(with = "vector")]
-        delta: [f32; 3] = POINT,
+        delta: [f32; 3] = POINT.within(NumberRange::FINITE),
         /// Largest magnitude of each component of `delta` in m. `None` means no limit.
         #[serde(default, with = "optional_number", skip_serializing_if = "Option::is_none")]
-        limit: Option<f32> = LENGTH.optional(),
+        limit: Option<f32> = LENGTH.within(NumberRange::AT_LEAST_ZERO).optional("no limit"),
     }
     /// Tears a constraint.
     Cut = 11 "cut" {
@@ -224,9 +237,9 @@ actions! {
         to: [f32; 3] = POINT,
         /// Direction in which the segment extends to both sides without limit; [0, 0, 1] for a planar scene.
         #[serde(with = "vector")]
-        direction: [f32; 3] = three("three numbers"),
+        direction: [f32; 3] = three("three numbers").within(NumberRange::COORDINATE).nonzero(),
     }
-    /// Replaces an anchor's path. The anchor reaches this pose within `over_s` and stays.
+    /// Moves an anchor to a pose within `over_s`, where it stays. Its path ends.
     MoveAnchor = 14 "move_anchor",
         "coordinates within 1e7, rotation not 0, over 0 to 3600 s; in 2-D, z 0 and a rotation about z" {
         /// Index of the anchor.
@@ -236,10 +249,10 @@ actions! {
         translation: [f32; 3] = POINT,
         /// Rotation relative to the pose at load, as the quaternion x, y, z, w.
         #[serde(default = "identity", with = "rotation")]
-        rotation: [f32; 4] = ROTATION.optional(),
+        rotation: [f32; 4] = ROTATION.optional("0 0 0 1"),
         /// Time to the pose in seconds, 0..=3600, rounded up to whole steps, at least one.
         #[serde(default, with = "number", skip_serializing_if = "is_zero")]
-        over_s: f32 = SECONDS.optional(),
+        over_s: f32 = SECONDS.optional("one step"),
     }
     /// Moves a collider to a pose within `over_s`, with the velocity that the motion implies.
     MoveCollider = 15 "move_collider",
@@ -251,41 +264,41 @@ actions! {
         translation: [f32; 3] = POINT,
         /// Rotation relative to the pose at load, as the quaternion x, y, z, w.
         #[serde(default = "identity", with = "rotation")]
-        rotation: [f32; 4] = ROTATION.optional(),
+        rotation: [f32; 4] = ROTATION.optional("0 0 0 1"),
         /// Time to the pose in seconds, 0..=3600, rounded up to whole steps, at least one.
         #[serde(default, with = "number", skip_serializing_if = "is_zero")]
-        over_s: f32 = SECONDS.optional(),
+        over_s: f32 = SECONDS.optional("one step"),
     }
     /// Sets a parameter of the simulation. [`Action::set`] makes one for the whole scene.
     Set = 16 "set" {
         /// Name of the parameter. An unknown name is rejected.
-        parameter: Text = text("the name of a parameter, at most 160 bytes"),
+        parameter: Text = words("the name of a parameter, at most 160 bytes"),
         /// New value. null in JSON means off.
         value: ParameterValue = VALUE,
         /// Kind of the affected constraints, for `compliance` and `stiffness`. `None` means all kinds.
         #[serde(default, deserialize_with = "kind_or_all", skip_serializing_if = "Option::is_none")]
-        constraint_kind: Option<KindFilter> = KIND.optional(),
+        constraint_kind: Option<KindFilter> = KIND.optional("all kinds"),
         /// Index of the generated block of the affected bends, for `bending`. `None` means all bends.
         #[serde(default, skip_serializing_if = "Option::is_none")]
-        block: Option<u32> = WHOLE.optional(),
+        block: Option<u32> = WHOLE.optional("all bends"),
         /// Index of the affected collider, for `friction` and `restitution`. `None` means all colliders.
         #[serde(default, skip_serializing_if = "Option::is_none")]
-        collider: Option<u32> = WHOLE.optional(),
+        collider: Option<u32> = WHOLE.optional("all colliders"),
     }
     /// Replaces the scene.
     Load = 17 "load", "a scene that the node can read; see its messages" {
         /// Name of a built-in scene, or path of a file on the node's host.
-        scene: Text = text("the name of a scene, at most 160 bytes"),
+        scene: Text = words("the name of a scene, at most 160 bytes"),
     }
     /// Puts an earlier state of this run in place: the nearest kept one at or before the target. Exactly one of the fields is
     /// present; the outcome has `to_step`, the step of the state.
     Rewind = 18 "rewind", "a step of this run that the node has made" {
         /// Step of the run.
         #[serde(default, skip_serializing_if = "Option::is_none")]
-        to_step: Option<u64> = LONG.optional(),
+        to_step: Option<u64> = LONG.optional(""),
         /// Number of steps back on the way to the current state. Steps that a rewind has left behind do not count.
         #[serde(default, skip_serializing_if = "Option::is_none")]
-        back_steps: Option<u32> = WHOLE.optional(),
+        back_steps: Option<u32> = WHOLE.optional(""),
     }
     /// Puts a given state in place. The state comes through a service of its own, so that a command alone is rejected.
     Restore = 19 "restore" {
@@ -298,7 +311,7 @@ actions! {
     /// Marks the step in the log. Changes nothing else.
     Mark = 20 "mark", "a text that is not empty" {
         /// Text for people and for programs that read the log. Empty text is rejected.
-        text: Text = text("a text of at most 160 bytes"),
+        text: Text = words("a text of at most 160 bytes").nonzero(),
     }
     /// Moves a body through the next step, by its mass and inertia, with impulses from the particles that it meets. After
     /// the step it stands where it came.
@@ -311,19 +324,19 @@ actions! {
         translation: [f32; 3] = POINT,
         /// Rotation at the start of the step relative to the pose at load, as the quaternion x, y, z, w.
         #[serde(default = "identity", with = "rotation")]
-        rotation: [f32; 4] = ROTATION.optional(),
+        rotation: [f32; 4] = ROTATION.optional("0 0 0 1"),
         /// Velocity of its center at the start of the step in m/s.
         #[serde(default, with = "vector")]
-        velocity: [f32; 3] = three("three numbers in m/s").optional(),
+        velocity: [f32; 3] = three("three numbers in m/s").within(NumberRange::COORDINATE).optional(ZERO),
         /// Angular velocity at the start of the step in rad/s.
         #[serde(default, with = "vector")]
-        angular_velocity: [f32; 3] = three("three numbers in rad/s").optional(),
+        angular_velocity: [f32; 3] = three("three numbers in rad/s").within(NumberRange::SPIN).optional(ZERO),
         /// Force on its center in N, beside gravity and the contacts.
         #[serde(default, with = "vector")]
-        force: [f32; 3] = three("three numbers in N").optional(),
+        force: [f32; 3] = three("three numbers in N").optional(ZERO),
         /// Torque about its center in N m, beside that of the contacts.
         #[serde(default, with = "vector")]
-        torque: [f32; 3] = three("three numbers in N m").optional(),
+        torque: [f32; 3] = three("three numbers in N m").optional(ZERO),
     }
     /// Leads a particle that this client has grabbed, an anchor or a collider along points in time. It moves linearly between
     /// them, and stays at the last one.
@@ -337,7 +350,7 @@ actions! {
         path: PathPart = FieldInfo::PATH,
         /// Appends the points to the motion that an earlier command began, and whose times go on.
         #[serde(default, skip_serializing_if = "is_false")]
-        append: bool = FLAG.optional(),
+        append: bool = FLAG.optional(""),
     }
 }
 
@@ -418,6 +431,34 @@ impl Action {
     pub fn decode(number: u32, fields: &[u8; Self::FIELDS_SIZE_BYTES]) -> Self {
         let action = Self::read(number, &mut FieldReader::new(fields));
         action.unwrap_or(Self::Unknown { number })
+    }
+
+    /// Checks everything that does not depend on a scene or its state. Every way of a command to a solver or a player
+    /// goes through this check.
+    ///
+    /// # Errors
+    /// [`Reason::NonFinite`], [`Reason::OutOfRange`] or [`Reason::UnknownParameter`], for the first field with a wrong
+    /// value; [`Reason::NoEffectHere`] for an unknown action.
+    pub fn validate(&self) -> Result<(), Reason> {
+        self.check_fields()?;
+        match *self {
+            Self::Push { delta, limit, .. } => {
+                let limit = limit.unwrap_or(f32::MAX);
+                let is_near =
+                    |axis: f32| NumberRange::COORDINATE.contains(axis.clamp(-limit, limit));
+                accept(delta.into_iter().all(is_near))
+            }
+            Self::Set { parameter, value, .. } => {
+                let parameter = Parameter::from_name(parameter.as_str());
+                let parameter = parameter.ok_or(Reason::UnknownParameter)?;
+                check_finite(value.numbers())?;
+                accept(parameter.info().accepts(value))
+            }
+            Self::Rewind { to_step, back_steps } => {
+                accept(to_step.is_some() != back_steps.is_some())
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Sets a parameter for the whole scene.
@@ -566,6 +607,42 @@ mod tests {
             assert_eq!(info.number, number, "{}", info.name);
             assert!(samples.iter().any(|sample| sample["kind"] == info.name), "{}", info.name);
         }
+    }
+
+    #[test]
+    fn a_wrong_value_is_refused_with_its_reason() {
+        for action in Action::samples() {
+            let is_valid = action.validate() == Ok(());
+            assert_eq!(is_valid, !matches!(action, Action::Unknown { .. }), "{action:?}");
+        }
+        let (out, non_finite) = (Reason::OutOfRange, Reason::NonFinite);
+        for (text, reason) in [
+            (r#""grab","particle":1,"target":["nan",0,0]"#, non_finite),
+            (r#""grab","particle":1,"target":[0,0,1.1e7]"#, out),
+            (r#""move","particle":1,"target":[0,0,0],"over_s":3600.1"#, out),
+            (r#""move","particle":1,"target":[0,0,0],"over_s":"nan""#, non_finite),
+            (r#""step","count":0"#, out),
+            (r#""push","center":[0,0,0],"radius":-1,"delta":[0,0,0]"#, out),
+            (r#""push","center":[0,0,0],"radius":1,"delta":[0,1e8,0]"#, out),
+            (r#""push","center":[0,0,0],"radius":1,"delta":[0,0,0],"limit":-0.1"#, out),
+            (r#""cut_segment","from":[0,0,0],"to":[1,0,0],"direction":[0,0,0]"#, out),
+            (r#""move_anchor","anchor":0,"translation":[0,0,0],"rotation":[0,0,0,0]"#, out),
+            (r#""move_collider","collider":0,"translation":[0,0,0],"over_s":-1"#, out),
+            (
+                r#""drive_body","collider":0,"translation":[0,0,0],"angular_velocity":[0,2e4,0]"#,
+                out,
+            ),
+            (r#""drive_body","collider":0,"translation":[0,0,0],"torque":["inf",0,0]"#, non_finite),
+            (r#""set","parameter":"colour","value":1"#, Reason::UnknownParameter),
+            (r#""set","parameter":"gravity","value":[0,"nan",0]"#, non_finite),
+            (r#""rewind""#, out),
+            (r#""mark","text":"""#, out),
+            (r#""follow","object":"anchor","object_index":0,"path":[]"#, out),
+        ] {
+            assert_eq!(read(&format!("{{\"kind\":{text}}}")).validate(), Err(reason), "{text}");
+        }
+        let limited = r#"{"kind":"push","center":[0,0,0],"radius":1,"delta":[0,1e8,0],"limit":1}"#;
+        assert_eq!(read(limited).validate(), Ok(()));
     }
 
     #[test]

@@ -59,6 +59,14 @@ impl NumberRange {
         Self { excludes_min: true, ..Self::closed(1.0, f32::MAX, "more than 1") };
     /// Counts of substeps and iterations.
     pub const PASSES: Self = Self::closed(1.0, 1000.0, "a whole number from 1 to 1000");
+    /// A finite number.
+    pub const FINITE: Self = Self::closed(-f32::MAX, f32::MAX, "a finite number");
+    /// A length in a command, such as a radius, in m.
+    pub const LENGTH: Self = Self::closed(0.0, COORDINATE_MAX, "0 to 1e7");
+    /// Time of a motion, in seconds.
+    pub const SECONDS: Self = Self::closed(0.0, OVER_S_MAX, "0 to 3600");
+    /// Component of an angular velocity, in rad/s.
+    pub const SPIN: Self = Self::closed(-1e4, 1e4, "-1e4 to 1e4");
     /// Pace of a node in multiples of real time.
     pub const TIME_SCALE: Self = Self::closed(1e-3, 1e3, "0.001 to 1000");
 

@@ -513,7 +513,7 @@ mod tests {
             assert_eq!(Parameter::from_number(number), Some(row.parameter));
             assert_eq!(Parameter::from_name(row.name), Some(row.parameter));
         }
-        assert_eq!(Parameter::from_number(20), None);
+        assert_eq!(Parameter::from_number(u32::MAX), None);
     }
 
     #[test]

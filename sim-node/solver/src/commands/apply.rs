@@ -70,6 +70,7 @@ impl Solver {
         if client_id >= CLIENT_ID_END {
             return Err(Reason::OutOfRange);
         }
+        action.validate()?;
         match *action {
             Action::Pin { particle } => self.pin(particle)?,
             Action::Unpin { particle } => self.unpin(particle)?,
@@ -131,7 +132,6 @@ impl Solver {
                 return Ok(Applied::Control(Control::Rewind { to_step, back_steps }));
             }
             Action::Restore { .. } => return Ok(Applied::Control(Control::Restore)),
-            Action::Mark { text } if text.as_str().is_empty() => return Err(Reason::OutOfRange),
             Action::Mark { .. } => return Ok(Applied::Control(Control::Mark)),
             Action::Unknown { .. } => return Err(Reason::NoEffectHere),
         }

@@ -2,9 +2,8 @@
 
 use glam::{DVec3, Vec3};
 
-use sim_types::{COORDINATE_MAX, Reason, TearCause};
+use sim_types::{Action, Reason, TearCause};
 
-use crate::checks::{check_finite, is_near};
 use crate::constraints::Constraint;
 use crate::solver::Solver;
 
@@ -52,7 +51,10 @@ impl Solver {
     /// # Errors
     /// A number is not finite or out of range.
     pub fn cut_radius(&mut self, sphere: Sphere) -> Result<(), Reason> {
-        self.check_sphere(&sphere)?;
+        self.assert_whole();
+        let Sphere { center, radius } = sphere;
+        Action::CutRadius { center, radius }.validate()?;
+        self.check_in_plane(&[center])?;
         self.tear_all(|a, b| sphere.contains(a) || sphere.contains(b));
         Ok(())
     }
@@ -65,27 +67,11 @@ impl Solver {
     pub fn cut_segment(&mut self, sweep: Sweep) -> Result<(), Reason> {
         self.assert_whole();
         let Sweep { from, to, direction } = sweep;
-        for vector in [from, to, direction] {
-            check_finite(&vector)?;
-        }
-        let is_near = is_near(&from) && is_near(&to) && is_near(&direction);
-        let leaves_plane = self.is_planar && (from[2] != 0.0 || to[2] != 0.0);
-        if !is_near || leaves_plane || direction == [0.0; 3] {
-            return Err(Reason::OutOfRange);
-        }
+        Action::CutSegment { from, to, direction }.validate()?;
+        self.check_in_plane(&[from, to])?;
         let strip = Strip::new(&sweep);
         self.tear_all(|a, b| strip.is_crossed(a, b));
         Ok(())
-    }
-
-    pub(crate) fn check_sphere(&self, sphere: &Sphere) -> Result<(), Reason> {
-        self.assert_whole();
-        check_finite(&sphere.center)?;
-        check_finite(&[sphere.radius])?;
-        let is_near = is_near(&sphere.center);
-        let is_in_plane = !self.is_planar || sphere.center[2] == 0.0;
-        let is_size = (0.0..=COORDINATE_MAX).contains(&sphere.radius);
-        if is_near && is_in_plane && is_size { Ok(()) } else { Err(Reason::OutOfRange) }
     }
 
     /// Tears the constraints whose ends meet a condition, unless they are torn.

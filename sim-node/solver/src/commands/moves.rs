@@ -1,9 +1,8 @@
 //! Commands that move anchors and colliders, and lead them and grabbed particles along points in time.
 
 use glam::Vec3;
-use sim_types::{MovedObject, OVER_S_MAX, PathPoint, Reason};
+use sim_types::{Action, MovedObject, PathPoint, Reason};
 
-use crate::checks::check_finite;
 use crate::frame::{Frame, Pose};
 use crate::motion::{MOTION_POINTS_MAX, Motion, steps_at};
 use crate::solver::Solver;
@@ -33,8 +32,9 @@ impl Solver {
     /// # Errors
     /// The anchor is unknown, a number is not finite or out of range, or too many motions are under way.
     pub fn move_anchor_over(&mut self, anchor: u32, pose: Pose, over_s: f32) -> Result<(), Reason> {
+        let Pose { translation, rotation } = pose;
+        Action::MoveAnchor { anchor, translation, rotation, over_s }.validate()?;
         let frame = Frame::check(&pose, self.context())?;
-        check_over(over_s)?;
         let object = (MovedObject::Anchor, anchor);
         let current = self.current_frame(object)?;
         let (moved, motion) = match self.grab_steps(over_s) {
@@ -67,8 +67,9 @@ impl Solver {
         pose: Pose,
         over_s: f32,
     ) -> Result<(), Reason> {
+        let Pose { translation, rotation } = pose;
+        Action::MoveCollider { collider, translation, rotation, over_s }.validate()?;
         let frame = Frame::check(&pose, self.context())?;
-        check_over(over_s)?;
         let object = (MovedObject::Collider, collider);
         self.check_accepted(object, &frame)?;
         match self.grab_steps(over_s) {
@@ -174,17 +175,14 @@ impl Solver {
         for &PathPoint { time, translation, rotation } in points {
             let frame = Frame::check(&Pose { translation, rotation }, self.context())?;
             self.check_accepted(object, &frame)?;
-            if !time.is_finite() {
-                return Err(Reason::NonFinite);
-            }
             let steps = steps_at(time, self.settings.rate_hz);
-            let is_after = checked.last().is_none_or(|(before, _)| *before < steps);
-            if !(0.0..=f64::from(OVER_S_MAX)).contains(&time) || !is_after {
+            // Times that ascend can round to the same time in steps.
+            if checked.last().is_some_and(|(before, _)| *before >= steps) {
                 return Err(Reason::OutOfRange);
             }
             checked.push((steps, frame));
         }
-        if checked.is_empty() { Err(Reason::OutOfRange) } else { Ok(checked) }
+        Ok(checked)
     }
 
     /// Checks that an object can have a frame: bounds do not rotate, and neither do particles.
@@ -224,10 +222,4 @@ impl Solver {
         let colliders = self.colliders.iter().filter_map(|collider| collider.motion.as_ref());
         grabs.chain(self.anchors.motions.iter().flatten()).chain(colliders)
     }
-}
-
-/// Checks a time for a motion.
-pub(super) fn check_over(over_s: f32) -> Result<(), Reason> {
-    check_finite(&[over_s])?;
-    if (0.0..=OVER_S_MAX).contains(&over_s) { Ok(()) } else { Err(Reason::OutOfRange) }
 }

@@ -1,12 +1,14 @@
 //! The fields of actions: their rows in the table, and their bytes on the wire.
 
 use super::words::{KindFilter, MovedObject, RestoreContents};
+use crate::limits::NumberRange;
 use crate::parameter::ParameterValue;
-use crate::path_part::{PathPart, PathPoint};
+use crate::path_part::{PathError, PathPart, PathPoint, PointFault, check_path};
+use crate::reason::Reason;
 use crate::text::Text;
 
 /// A field of an action.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FieldInfo {
     /// Name in JSON.
     pub name: &'static str,
@@ -16,8 +18,14 @@ pub struct FieldInfo {
     pub form: FieldForm,
     /// Values of this form and unit, in words.
     pub allowed: &'static str,
+    /// Allowed numbers, for each component of a vector.
+    pub range: NumberRange,
+    /// The number 0, a vector of zeros and the empty text are refused.
+    pub is_nonzero: bool,
     /// The JSON form can lack the field.
     pub is_optional: bool,
+    /// Value of an optional field that the JSON form lacks, in words. Empty if the words would say nothing.
+    pub default: &'static str,
     /// Size on the wire, in bytes.
     pub size_bytes: usize,
 }
@@ -54,17 +62,33 @@ pub enum FieldForm {
 }
 
 const fn field(form: FieldForm, allowed: &'static str) -> FieldInfo {
-    FieldInfo { name: "", meaning: "", form, allowed, is_optional: false, size_bytes: 0 }
+    let (range, is_nonzero) = (NumberRange::FINITE, false);
+    let (is_optional, default) = (false, "");
+    FieldInfo {
+        name: "",
+        meaning: "",
+        form,
+        allowed,
+        range,
+        is_nonzero,
+        is_optional,
+        default,
+        size_bytes: 0,
+    }
 }
 
 pub(super) const WHOLE: FieldInfo = field(FieldForm::Whole, "whole numbers 0..=4294967295");
 pub(super) const LONG: FieldInfo = field(FieldForm::Long, "whole numbers from 0");
-pub(super) const SECONDS: FieldInfo = field(FieldForm::Number, "a number of seconds");
-pub(super) const LENGTH: FieldInfo = field(FieldForm::Number, "a number in m");
+pub(super) const SECONDS: FieldInfo =
+    field(FieldForm::Number, "a number of seconds").within(NumberRange::SECONDS);
+pub(super) const LENGTH: FieldInfo =
+    field(FieldForm::Number, "a number in m").within(NumberRange::LENGTH);
 pub(super) const FLAG: FieldInfo = field(FieldForm::Flag, "true or false");
-pub(super) const POINT: FieldInfo = three("three numbers in m");
+pub(super) const POINT: FieldInfo = three("three numbers in m").within(NumberRange::COORDINATE);
 pub(super) const ROTATION: FieldInfo =
-    field(FieldForm::Rotation, "four numbers: a quaternion x, y, z, w");
+    field(FieldForm::Rotation, "four numbers: a quaternion x, y, z, w")
+        .within(NumberRange::COORDINATE)
+        .nonzero();
 pub(super) const VALUE: FieldInfo =
     field(FieldForm::Value, "a number, three numbers, or null for off");
 pub(super) const KIND: FieldInfo = field(FieldForm::Kind, "structural, shear, bend, tether or all");
@@ -76,7 +100,7 @@ pub(super) const fn three(allowed: &'static str) -> FieldInfo {
     field(FieldForm::Vector, allowed)
 }
 
-pub(super) const fn text(allowed: &'static str) -> FieldInfo {
+pub(super) const fn words(allowed: &'static str) -> FieldInfo {
     field(FieldForm::Text, allowed)
 }
 
@@ -87,9 +111,43 @@ impl FieldInfo {
         "points such as {\"time\":0.5,\"translation\":[0,0.1,0],\"rotation\":[0,0,0,1]}",
     );
 
-    pub(super) const fn optional(self) -> Self {
-        Self { is_optional: true, ..self }
+    pub(super) const fn within(self, range: NumberRange) -> Self {
+        Self { range, ..self }
     }
+
+    pub(super) const fn nonzero(self) -> Self {
+        Self { is_nonzero: true, ..self }
+    }
+
+    pub(super) const fn optional(self, default: &'static str) -> Self {
+        Self { is_optional: true, default, ..self }
+    }
+
+    /// Name of the argument on a command line and in Python: without the unit, which its values can have.
+    pub fn argument(&self) -> &'static str {
+        match self.form {
+            FieldForm::Kind => "kind",
+            _ => self.name.strip_suffix("_s").unwrap_or(self.name),
+        }
+    }
+
+    fn check_numbers(&self, numbers: &[f32]) -> Result<(), Reason> {
+        check_finite(numbers)?;
+        let is_zero = numbers.iter().all(|number| *number == 0.0);
+        let is_in_range = numbers.iter().all(|number| self.range.contains(*number));
+        accept(is_in_range && !(is_zero && self.is_nonzero))
+    }
+}
+
+/// Checks that numbers are finite.
+pub(super) fn check_finite(numbers: &[f32]) -> Result<(), Reason> {
+    let is_finite = numbers.iter().all(|number| number.is_finite());
+    if is_finite { Ok(()) } else { Err(Reason::NonFinite) }
+}
+
+/// Refuses a value that is out of range.
+pub(super) fn accept(is_allowed: bool) -> Result<(), Reason> {
+    if is_allowed { Ok(()) } else { Err(Reason::OutOfRange) }
 }
 
 /// Writes fields one after the other.
@@ -137,11 +195,16 @@ pub(super) trait FieldType: Sized {
 
     /// Returns `None` if the bytes are no value of this type.
     fn read(reader: &mut FieldReader<'_>) -> Option<Self>;
+
+    /// Checks the value against the row of its field.
+    fn check(&self, _field: &FieldInfo) -> Result<(), Reason> {
+        Ok(())
+    }
 }
 
 /// Numbers are little-endian.
 macro_rules! numbers {
-    ($($type:ty),+) => {$(
+    ($($type:ty: $number:ident, $field:ident => $check:expr;)+) => {$(
         impl FieldType for $type {
             const SIZE_BYTES: usize = size_of::<Self>();
 
@@ -152,11 +215,21 @@ macro_rules! numbers {
             fn read(reader: &mut FieldReader<'_>) -> Option<Self> {
                 reader.take().map(Self::from_le_bytes)
             }
+
+            fn check(&self, $field: &FieldInfo) -> Result<(), Reason> {
+                let $number = *self;
+                $check
+            }
         }
     )+};
 }
 
-numbers!(u32, u64, f32, f64);
+numbers! {
+    u32: number, field => accept(number > 0 || !field.is_nonzero);
+    u64: _number, _field => Ok(());
+    f32: number, field => field.check_numbers(&[number]);
+    f64: _number, _field => Ok(());
+}
 
 /// Types with a number of 32 bits.
 macro_rules! numbered {
@@ -201,6 +274,10 @@ impl<const COUNT: usize> FieldType for [f32; COUNT] {
         }
         Some(numbers)
     }
+
+    fn check(&self, field: &FieldInfo) -> Result<(), Reason> {
+        field.check_numbers(self)
+    }
 }
 
 /// 1 and the value, or 0 and zeros.
@@ -222,6 +299,10 @@ impl<T: FieldType> FieldType for Option<T> {
         reader.0 = reader.0.get(T::SIZE_BYTES..)?;
         Some(None)
     }
+
+    fn check(&self, field: &FieldInfo) -> Result<(), Reason> {
+        self.iter().try_for_each(|value| value.check(field))
+    }
 }
 
 /// UTF-8, padded with zeros.
@@ -234,6 +315,10 @@ impl FieldType for Text {
 
     fn read(reader: &mut FieldReader<'_>) -> Option<Self> {
         reader.take().map(|bytes| Self::from_wire(&bytes))
+    }
+
+    fn check(&self, field: &FieldInfo) -> Result<(), Reason> {
+        accept(!self.as_str().is_empty() || !field.is_nonzero)
     }
 }
 
@@ -278,6 +363,17 @@ impl FieldType for PathPart {
             *point = PathPoint::read(reader)?;
         }
         Self::new(points.get(..count)?)
+    }
+
+    fn check(&self, _field: &FieldInfo) -> Result<(), Reason> {
+        for point in self.points() {
+            POINT.check_numbers(&point.translation)?;
+            ROTATION.check_numbers(&point.rotation)?;
+        }
+        check_path(self.points()).map_err(|error| match error {
+            PathError::Point { fault: PointFault::NotFinite, .. } => Reason::NonFinite,
+            _ => Reason::OutOfRange,
+        })
     }
 }
 
