@@ -6,7 +6,6 @@ mod ctl;
 mod domain;
 mod endpoint;
 mod lesson;
-mod parameter;
 mod real_time;
 mod run;
 mod scene;
@@ -23,7 +22,7 @@ use sim_solver::builtin;
 use sim_solver::scene::is_path;
 
 pub(crate) use bench::{BenchArgs, BenchClientArgs, ClientRole};
-pub(crate) use command::{CommandVerb, FollowArgs, PoseArgs, RewindArgs, SetArgs};
+pub(crate) use command::CommandVerb;
 pub(crate) use ctl::{CtlArgs, CtlVerb, QueryVerb, WatchArgs};
 pub(crate) use domain::{DoctorArgs, PsArgs};
 use endpoint::EndpointArgs;
@@ -122,7 +121,6 @@ pub(crate) fn try_parse(
         Some(Verb::Doctor(doctor)) => doctor.domain.inherit(&args.run.endpoint),
         _ => {}
     }
-    check_value(&mut command, &args)?;
     check_run(&mut command, &args)?;
     Ok(args)
 }
@@ -177,16 +175,6 @@ fn check_order(command: &mut Command, matches: &ArgMatches) -> Result<(), clap::
     let allowed = allowed.iter().map(|id| format!("--{id}")).collect::<Vec<_>>().join(", ");
     let text = format!("{name} cannot precede the subcommand '{verb}' (allowed there: {allowed})");
     Err(command.error(ErrorKind::ArgumentConflict, text))
-}
-
-/// Refuses a value of `ctl set` whose words do not fit together, which clap cannot see.
-fn check_value(command: &mut Command, args: &Args) -> Result<(), clap::Error> {
-    let Some(Verb::Ctl(ctl)) = &args.verb else { return Ok(()) };
-    let CtlVerb::Command(CommandVerb::Set(set)) = &ctl.verb else { return Ok(()) };
-    let Err(text) = set.value() else { return Ok(()) };
-    let ctl = command.find_subcommand_mut("ctl");
-    let set = ctl.and_then(|ctl| ctl.find_subcommand_mut("set")).cloned();
-    Err(set.unwrap_or_else(|| command.clone()).error(ErrorKind::WrongNumberOfValues, text))
 }
 
 /// Refuses options of `run` that contradict each other, with the reason.

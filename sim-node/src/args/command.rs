@@ -1,400 +1,364 @@
-//! Command lines of the commands of `ctl`: each one is applied by the node and has an outcome.
+//! The commands of `ctl`: their arguments are made from the table of actions.
 
 use std::path::PathBuf;
 use std::time::Duration;
 
-use clap::builder::{NonEmptyStringValueParser, PossibleValuesParser, TypedValueParser};
-use clap::{ArgAction, Args as ClapArgs, Subcommand};
-use sim_contract::{ConstraintKind, GRAB_OVER_S_DEFAULT, MovedObject, OVER_S_MAX, ParameterValue};
+use clap::builder::{
+    NonEmptyStringValueParser, PossibleValuesParser, TypedValueParser, ValueParser,
+};
+use clap::error::ErrorKind;
+use clap::{Arg, ArgAction, ArgGroup, ArgMatches, Command, FromArgMatches, Subcommand};
+use serde::Serialize;
+use serde_json::{Map, Value};
+use sim_contract::{
+    ACTIONS, ActionInfo, ConstraintKind, FieldForm, FieldInfo, MovedObject, OVER_S_MAX, PARAMETERS,
+    Parameter, ParameterInfo, ParameterValue, PlainF32, ValueForm,
+};
 
-use super::parameter::{parameter_name, parameters_help};
 use super::value::{index, number, seconds_up_to, time, whole};
 
-#[derive(Debug, Subcommand)]
-pub(crate) enum CommandVerb {
-    /// Hold a particle at its present position
-    #[command(after_help = "Example: sim-node ctl pin 3")]
-    Pin {
-        /// Index of the particle
-        #[arg(value_parser = index)]
-        particle: u32,
-    },
-    /// Free a pinned particle, from rest
-    #[command(after_help = "Example: sim-node ctl unpin 3")]
-    Unpin {
-        /// Index of the particle
-        #[arg(value_parser = index)]
-        particle: u32,
-    },
-    /// Grab a particle and drive it to a target
-    #[command(after_help = "Example: sim-node ctl grab 90 0.5 -0.2 0.3 --over 0.1")]
-    Grab(TargetArgs),
-    /// Drive a grabbed particle to a new target
-    #[command(after_help = "Example: sim-node ctl move 90 0.6 -0.2 0.3")]
-    Move(TargetArgs),
-    /// Release a grabbed particle with the velocity of its last motion
-    #[command(
-        after_help = "Examples:\n  sim-node ctl release 90\n  sim-node ctl release 90 --force"
-    )]
-    Release {
-        /// Index of the particle
-        #[arg(value_parser = index)]
-        particle: u32,
-        /// Release it even if another client has grabbed it
-        #[arg(long)]
-        force: bool,
-    },
-    /// Set the velocity of all free particles within a sphere, as a brush does
-    Push(PushArgs),
-    /// Tear a constraint
-    #[command(after_help = "Example: sim-node ctl cut 17")]
-    Cut {
-        /// Index of the constraint
-        #[arg(value_parser = index)]
-        constraint: u32,
-    },
-    /// Tear all constraints with an end within a sphere
-    CutRadius(CutRadiusArgs),
-    /// Tear all constraints that cross a strip
-    CutSegment(CutSegmentArgs),
-    /// Move an anchor to a pose and end its path
-    #[command(
-        allow_negative_numbers = true,
-        after_help = "Examples:\n  \
-            sim-node ctl move-anchor 0 0.2 0 -0.1\n  \
-            sim-node ctl move-anchor 0 0.2 0 -0.1 --over 5s"
-    )]
-    MoveAnchor {
-        /// Index of the anchor
-        #[arg(value_parser = index)]
-        anchor: u32,
-        #[command(flatten)]
-        pose: PoseArgs,
-        #[command(flatten)]
-        over: OverArgs,
-    },
-    /// Move a collider to a pose
-    ///
-    /// Without --over, the whole way is made within one step, with the speed that this implies.
-    #[command(
-        allow_negative_numbers = true,
-        after_help = "Examples:\n  \
-            sim-node ctl move-collider 0 0 0.1 -0.2 --rotation 0 0.6 0 0.8\n  \
-            sim-node ctl move-collider 0 0 0.1 -0.2 --over 5s"
-    )]
-    MoveCollider {
-        /// Index of the collider
-        #[arg(value_parser = index)]
-        collider: u32,
-        #[command(flatten)]
-        pose: PoseArgs,
-        #[command(flatten)]
-        over: OverArgs,
-    },
-    /// Lead a grabbed particle, an anchor or a collider along points in time
-    ///
-    /// The file has a point on each line: the time in s after this command, x, y and z, and where it rotates the
-    /// quaternion x, y, z, w, separated by commas or spaces. Times ascend. A line that begins with # is a comment. A point
-    /// is in m: of a particle relative to the origin of the scene, else relative to the pose at load. The object
-    /// moves linearly from where it is, and stays at the last point. At most 2048 points are on their way. Four points
-    /// are a command; the printed outcome is the outcome of the first command, or of the first rejected command.
-    #[command(after_help = "Examples:\n  \
-        sim-node ctl follow collider 0 --path wave.csv\n  \
-        sim-node ctl follow particle 90 --path arc.csv")]
-    Follow(FollowArgs),
-    /// Move a body of another program through the next step
-    DriveBody(DriveBodyArgs),
-    /// Set a parameter of the simulation
-    Set(SetArgs),
-    /// Load another scene
-    ///
-    /// The step number continues, unless the scene has another rate: then a new run begins at step 0.
-    #[command(after_help = "Examples:\n  sim-node ctl load rope\n  sim-node ctl load ./my.toml")]
-    Load {
-        /// Built-in scene, or TOML file that the node can read: a path with / or ending in .toml
-        scene: String,
-    },
-    /// Pause the node at its next step boundary
-    Pause,
-    /// Resume a paused node
-    Resume,
-    /// Run COUNT steps of a paused node, and wait for the last one
-    ///
-    /// With --timeout, the wait ends after this time and that of one step. The node goes on to the last
-    /// step all the same, or until `ctl pause`.
-    #[command(after_help = "Example: sim-node ctl step 10")]
-    Step {
-        /// Number of steps, 1 to 4294967295
-        #[arg(default_value_t = 1, value_parser = whole::<u32>(1..=u64::from(u32::MAX)))]
-        count: u32,
-    },
-    /// Restore the initial state in the next step; the step number continues
-    Reset,
-    /// Put an earlier state in place, as the state of the next step; the step number continues
-    ///
-    /// The state is the nearest kept one at or before the target. `sim-node run --history` sets the memory
-    /// for past states: the node keeps every step while it fits, then old states at growing distances.
-    /// A replay (`recorder play`) continues at the target, as a new run, and --to-step also goes forward.
-    #[command(after_help = "Examples:\n  \
-        sim-node ctl rewind 2s\n  \
-        sim-node ctl rewind --to-step 480")]
-    Rewind(RewindArgs),
-    /// Mark the next step in the log with a text; nothing else changes
-    ///
-    /// The mark is an outcome like that of any other command, so every recording has it. A recorder with
-    /// --black-box then writes what it has kept.
-    #[command(after_help = "Example: sim-node ctl mark 'the sleeve slips'")]
-    Mark {
-        /// Text of at most 160 bytes
-        #[arg(value_parser = NonEmptyStringValueParser::new())]
-        text: String,
-    },
-}
-
-#[derive(Debug, ClapArgs)]
-#[group(required = true, multiple = false)]
-pub(crate) struct RewindArgs {
-    /// Simulated time to go back, such as 2s or 500ms. Steps that an earlier rewind has left behind do not
-    /// count
-    #[arg(value_parser = time)]
+/// A command of `ctl` with its arguments.
+#[derive(Debug, Clone)]
+pub(crate) struct CommandVerb {
+    /// Row of the action.
+    pub(crate) info: &'static ActionInfo,
+    /// JSON form of the action, without the fields that have no argument of the same meaning.
+    pub(crate) fields: Map<String, Value>,
+    /// File with the points of a `follow`.
+    pub(crate) path: Option<PathBuf>,
+    /// Time to go back in a `rewind`.
     pub(crate) time: Option<Duration>,
-    /// Step of the run to go back to
-    #[arg(long, value_name = "N", value_parser = whole::<u64>(0..=u64::MAX))]
-    pub(crate) to_step: Option<u64>,
 }
 
-/// A point, as three arguments.
-#[derive(Debug, Clone, Copy, ClapArgs)]
-pub(crate) struct PointArgs {
-    /// Point in m, relative to the origin of the scene
-    #[arg(value_parser = number)]
-    x: f32,
-    /// Point in m, relative to the origin of the scene
-    #[arg(value_parser = number)]
-    y: f32,
-    /// Point in m, relative to the origin of the scene
-    #[arg(value_parser = number)]
-    z: f32,
+/// Words in the help of a command, beside those of the table of actions.
+struct Words {
+    kind: &'static str,
+    details: &'static str,
+    examples: &'static [&'static str],
 }
 
-impl PointArgs {
-    pub(crate) fn vector(self) -> [f32; 3] {
-        [self.x, self.y, self.z]
+#[rustfmt::skip]
+const WORDS: &[Words] = &[
+    Words { kind: "pin", details: "", examples: &["pin 3"] },
+    Words { kind: "unpin", details: "", examples: &["unpin 3"] },
+    Words { kind: "grab", details: "", examples: &["grab 90 0.5 -0.2 0.3 --over 0.1"] },
+    Words { kind: "move", details: "", examples: &["move 90 0.6 -0.2 0.3"] },
+    Words { kind: "release", details: "", examples: &["release 90", "release 90 --force"] },
+    Words {
+        kind: "step",
+        details: "Waits for the last step. With --timeout, the wait ends after this time and that of one step. The node \
+            goes on to the last step all the same, or until `ctl pause`.",
+        examples: &["step 10"],
+    },
+    Words { kind: "push", details: "", examples: &["push 0.5 0.5 0 --radius 0.2 --delta 0 0 -0.01 --limit 0.02"] },
+    Words { kind: "cut", details: "", examples: &["cut 17"] },
+    Words { kind: "cut_radius", details: "", examples: &["cut-radius 0.5 0.5 0 --radius 0.1"] },
+    Words { kind: "cut_segment", details: "", examples: &["cut-segment --from 0 0.5 0 --to 1 0.5 0 --direction 0 0 1"] },
+    Words { kind: "move_anchor", details: "", examples: &["move-anchor 0 0.2 0 -0.1", "move-anchor 0 0.2 0 -0.1 --over 5s"] },
+    Words {
+        kind: "move_collider",
+        details: "Without --over, the whole way is made within one step, with the speed that this implies.",
+        examples: &["move-collider 0 0 0.1 -0.2 --rotation 0 0.6 0 0.8", "move-collider 0 0 0.1 -0.2 --over 5s"],
+    },
+    Words {
+        kind: "set",
+        details: "",
+        examples: &[
+            "set damping 0.5", "set gravity 0 -1.6 0", "set tear_stretch off", "set compliance 1e-4 --kind bend",
+            "set bending 1e-3 --block 1", "set friction 0.3 --collider 2",
+        ],
+    },
+    Words {
+        kind: "load",
+        details: "A path has a / or ends in .toml, and the node must be able to read the file. The step number continues, \
+            unless the scene has another rate: then a new run begins at step 0.",
+        examples: &["load rope", "load ./my.toml"],
+    },
+    Words {
+        kind: "rewind",
+        details: "The step number continues. `sim-node run --history` sets the memory for past states: the node keeps \
+            every step while it fits, then old states at growing distances. A replay (`recorder play`) continues at the \
+            target, as a new run, and --to-step also goes forward.",
+        examples: &["rewind 2s", "rewind --to-step 480"],
+    },
+    Words {
+        kind: "mark",
+        details: "The mark is an outcome like that of any other command, so every recording has it. A recorder with \
+            --black-box then writes what it has kept.",
+        examples: &["mark 'the sleeve slips'"],
+    },
+    Words { kind: "drive_body", details: "", examples: &["drive-body 0 0 0.1 0 --velocity 0 -1.5 0 --force 2 0 0"] },
+    Words {
+        kind: "follow",
+        details: "The file has a point on each line: the time in s after this command, x, y and z, and where it rotates \
+            the quaternion x, y, z, w, separated by commas or spaces. Times ascend. A line that begins with # is a \
+            comment. A point is in m: of a particle relative to the origin of the scene, else relative to the pose at \
+            load. The object moves linearly from where it is. At most 2048 points are on their way. Four points are a \
+            command; the printed outcome is the outcome of the first command, or of the first rejected command.",
+        examples: &["follow collider 0 --path wave.csv", "follow particle 90 --path arc.csv"],
+    },
+];
+
+impl Subcommand for CommandVerb {
+    fn augment_subcommands(command: Command) -> Command {
+        // A restore carries a state, which no command line can.
+        command.subcommands(ACTIONS.iter().filter(|info| info.name != "restore").map(subcommand))
+    }
+
+    fn augment_subcommands_for_update(command: Command) -> Command {
+        Self::augment_subcommands(command)
+    }
+
+    fn has_subcommand(name: &str) -> bool {
+        action(name).is_some()
     }
 }
 
-#[derive(Debug, ClapArgs)]
-#[command(allow_negative_numbers = true)]
-pub(crate) struct TargetArgs {
-    /// Index of the particle
-    #[arg(value_parser = index)]
-    pub(crate) particle: u32,
-    #[command(flatten)]
-    pub(crate) target: PointArgs,
-    /// Time to the target in seconds, such as 0.1, or with its unit, such as 100ms: at most an hour, rounded up to whole
-    /// steps [default: 1/60 s]
-    #[arg(long, value_name = "TIME", default_value_t = GRAB_OVER_S_DEFAULT,
-        hide_default_value = true, value_parser = seconds_up_to(OVER_S_MAX))]
-    pub(crate) over: f32,
+impl FromArgMatches for CommandVerb {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
+        let named = matches.subcommand().and_then(|(name, given)| Some((action(name)?, given)));
+        let (info, given) = named.ok_or_else(|| clap::Error::new(ErrorKind::MissingSubcommand))?;
+        let mut fields = Map::from_iter([("kind".to_owned(), info.name.into())]);
+        for field in info.fields {
+            let value = value(field, given).map_err(|text| {
+                let name = format!("sim-node ctl {}", verb(info));
+                subcommand(info).bin_name(name).error(ErrorKind::WrongNumberOfValues, text)
+            })?;
+            fields.extend(value.map(|value| (field.name.to_owned(), value)));
+        }
+        let path = given.try_get_one::<PathBuf>("path").ok().flatten().cloned();
+        let time = given.try_get_one::<Duration>(TIME).ok().flatten().copied();
+        Ok(Self { info, fields, path, time })
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
 }
 
-#[derive(Debug, ClapArgs)]
-#[command(
-    allow_negative_numbers = true,
-    after_help = "Example: sim-node ctl push 0.5 0.5 0 --radius 0.2 --delta 0 0 -0.01 --limit 0.02"
-)]
-pub(crate) struct PushArgs {
-    #[command(flatten)]
-    pub(crate) center: PointArgs,
-    /// Radius of the sphere in m; a particle at exactly this distance is outside
-    #[arg(long, value_name = "R", value_parser = number)]
-    pub(crate) radius: f32,
-    /// Displacement of the particles in the next step, in m
-    #[arg(long, num_args = 3, action = ArgAction::Set, required = true,
-        value_names = ["DX", "DY", "DZ"], value_parser = number)]
-    pub(crate) delta: Vec<f32>,
-    /// Limit on each component of DELTA, in m [default: no limit]
-    #[arg(long, value_name = "L", value_parser = number)]
-    pub(crate) limit: Option<f32>,
+/// Name of the argument of a rewind that is no step.
+const TIME: &str = "time";
+
+fn action(verb: &str) -> Option<&'static ActionInfo> {
+    ACTIONS.iter().find(|info| self::verb(info) == verb)
 }
 
-#[derive(Debug, ClapArgs)]
-#[command(
-    allow_negative_numbers = true,
-    after_help = "Example: sim-node ctl cut-radius 0.5 0.5 0 --radius 0.1"
-)]
-pub(crate) struct CutRadiusArgs {
-    #[command(flatten)]
-    pub(crate) center: PointArgs,
-    /// Radius of the sphere in m; a particle at exactly this distance is outside
-    #[arg(long, value_name = "R", value_parser = number)]
-    pub(crate) radius: f32,
+fn verb(info: &ActionInfo) -> String {
+    info.name.replace('_', "-")
 }
 
-#[derive(Debug, ClapArgs)]
-#[command(
-    allow_negative_numbers = true,
-    after_help = "Example: sim-node ctl cut-segment --from 0 0.5 0 --to 1 0.5 0 --direction 0 0 1"
-)]
-pub(crate) struct CutSegmentArgs {
-    /// Start of the segment in m, relative to the origin of the scene
-    #[arg(long, num_args = 3, action = ArgAction::Set, required = true,
-        value_names = ["X", "Y", "Z"], value_parser = number)]
-    pub(crate) from: Vec<f32>,
-    /// End of the segment in m, relative to the origin of the scene
-    #[arg(long, num_args = 3, action = ArgAction::Set, required = true,
-        value_names = ["X", "Y", "Z"], value_parser = number)]
-    pub(crate) to: Vec<f32>,
-    /// Direction in which the strip extends from the segment, without end to both sides
-    #[arg(long, num_args = 3, action = ArgAction::Set, default_values = ["0", "0", "1"],
-        value_names = ["DX", "DY", "DZ"], value_parser = number)]
-    pub(crate) direction: Vec<f32>,
-}
-
-#[derive(Debug, ClapArgs)]
-#[command(
-    allow_negative_numbers = true,
-    after_help = "Example: sim-node ctl drive-body 0 0 0.1 0 --velocity 0 -1.5 0 --force 2 0 0"
-)]
-pub(crate) struct DriveBodyArgs {
-    /// Index of the collider that is the body
-    #[arg(value_parser = index)]
-    pub(crate) collider: u32,
-    #[command(flatten)]
-    pub(crate) pose: PoseArgs,
-    /// Velocity of its center, in m/s
-    #[arg(long, num_args = 3, action = ArgAction::Set, default_values = ["0", "0", "0"],
-        value_names = ["VX", "VY", "VZ"], value_parser = number)]
-    pub(crate) velocity: Vec<f32>,
-    /// Angular velocity, in rad/s
-    #[arg(long, num_args = 3, action = ArgAction::Set, default_values = ["0", "0", "0"],
-        value_names = ["WX", "WY", "WZ"], value_parser = number)]
-    pub(crate) angular_velocity: Vec<f32>,
-    /// Force on its center in N, beside gravity and the contacts
-    #[arg(long, num_args = 3, action = ArgAction::Set, default_values = ["0", "0", "0"],
-        value_names = ["FX", "FY", "FZ"], value_parser = number)]
-    pub(crate) force: Vec<f32>,
-    /// Torque about its center in N m, beside that of the contacts
-    #[arg(long, num_args = 3, action = ArgAction::Set, default_values = ["0", "0", "0"],
-        value_names = ["TX", "TY", "TZ"], value_parser = number)]
-    pub(crate) torque: Vec<f32>,
-}
-
-/// A pose relative to the pose at load.
-#[derive(Debug, ClapArgs)]
-pub(crate) struct PoseArgs {
-    /// Translation from the pose at load, in m
-    #[arg(value_parser = number)]
-    pub(crate) x: f32,
-    /// Translation from the pose at load, in m
-    #[arg(value_parser = number)]
-    pub(crate) y: f32,
-    /// Translation from the pose at load, in m
-    #[arg(value_parser = number)]
-    pub(crate) z: f32,
-    /// Rotation from the pose at load, as a quaternion
-    #[arg(long, num_args = 4, action = ArgAction::Set, default_values = ["0", "0", "0", "1"],
-        value_names = ["QX", "QY", "QZ", "QW"], value_parser = number)]
-    pub(crate) rotation: Vec<f32>,
-}
-
-/// The time of a motion.
-#[derive(Debug, Clone, Copy, ClapArgs)]
-pub(crate) struct OverArgs {
-    /// Time to the pose in seconds, such as 0.1, or with its unit, such as 100ms: at most an hour, rounded up to whole
-    /// steps [default: one step]
-    #[arg(long, value_name = "TIME", default_value_t = 0.0, hide_default_value = true,
-        value_parser = seconds_up_to(OVER_S_MAX))]
-    pub(crate) over: f32,
-}
-
-#[derive(Debug, ClapArgs)]
-pub(crate) struct FollowArgs {
-    /// Kind of the object
-    #[arg(value_parser = moved_object())]
-    pub(crate) object: MovedObject,
-    /// Index of the particle, anchor or collider
-    #[arg(value_parser = index)]
-    pub(crate) index: u32,
-    /// File with the points
-    #[arg(long, value_name = "FILE")]
-    pub(crate) path: PathBuf,
-    /// Append the points to the motion under way, whose times go on
-    #[arg(long)]
-    pub(crate) append: bool,
-}
-
-/// Parser of the name of an object.
-fn moved_object() -> impl TypedValueParser<Value = MovedObject> {
-    const ALL: [(&str, MovedObject); 3] = [
-        ("particle", MovedObject::Particle),
-        ("anchor", MovedObject::Anchor),
-        ("collider", MovedObject::Collider),
-    ];
-    PossibleValuesParser::new(ALL.map(|(name, _)| name)).try_map(|name| {
-        let named = ALL.into_iter().find(|(one, _)| *one == name);
-        named.map(|(_, object)| object).ok_or("there is no such object")
+fn subcommand(info: &'static ActionInfo) -> Command {
+    let words = WORDS.iter().find(|words| words.kind == info.name);
+    let about = imperative(info.meaning);
+    let mut command = Command::new(verb(info))
+        .allow_negative_numbers(info.fields.iter().any(|field| has_numbers(field.form)))
+        .args(info.fields.iter().map(|field| argument(info, field)));
+    if let Some(details) = words.map(|words| words.details).filter(|details| !details.is_empty()) {
+        command = command.long_about(format!("{about}\n\n{details}"));
+    }
+    if info.name == "rewind" {
+        let group = ArgGroup::new("target").args([TIME, "to_step"]).required(true);
+        command = command.group(group);
+    }
+    let examples = words.map_or(&[][..], |words| words.examples);
+    command.about(about).after_help(match examples {
+        [] => String::new(),
+        [one] => format!("Example: sim-node ctl {one}"),
+        all => format!("Examples:\n  sim-node ctl {}", all.join("\n  sim-node ctl ")),
     })
 }
 
-#[derive(Debug, ClapArgs)]
-#[command(
-    allow_negative_numbers = true,
-    after_help = "Examples:\n  \
-        sim-node ctl set damping 0.5\n  \
-        sim-node ctl set gravity 0 -1.6 0\n  \
-        sim-node ctl set tear_stretch off\n  \
-        sim-node ctl set compliance 1e-4 --kind bend\n  \
-        sim-node ctl set bending 1e-3 --block 1\n  \
-        sim-node ctl set friction 0.3 --collider 2"
-)]
-pub(crate) struct SetArgs {
-    #[arg(help = parameters_help(), value_parser = parameter_name)]
-    pub(crate) parameter: String,
-    /// A number, three numbers for a vector, or "off"
-    #[arg(num_args = 1..=3, required = true, value_name = "VALUE", value_parser = setting_word)]
-    pub(crate) values: Vec<SettingWord>,
-    /// Kind of constraints that receive the compliance or stiffness [default: all kinds]
-    #[arg(long, value_name = "KIND", value_parser = constraint_kind())]
-    pub(crate) kind: Option<ConstraintKind>,
-    /// Generated block of the scene whose bends receive the bending, counted from 0 [default: all bends]
-    #[arg(long, value_name = "N", value_parser = index)]
-    pub(crate) block: Option<u32>,
-    /// Collider that receives the friction or restitution, counted from 0 [default: all colliders]
-    #[arg(long, value_name = "N", value_parser = index)]
-    pub(crate) collider: Option<u32>,
+/// First sentence of the meaning of an action, which begins with a verb in the third person.
+fn imperative(meaning: &str) -> String {
+    let sentence = meaning.split_once(". ").map_or(meaning, |(first, _)| first);
+    let (verb, rest) = sentence.split_once(' ').unwrap_or((sentence, ""));
+    format!("{} {}", verb.strip_suffix('s').unwrap_or(verb), rest.trim_end_matches('.'))
 }
 
-/// Parser of the name of a kind; the help lists the names.
-fn constraint_kind() -> impl TypedValueParser<Value = ConstraintKind> {
-    PossibleValuesParser::new(ConstraintKind::ALL.map(ConstraintKind::name))
-        .try_map(|name| ConstraintKind::from_name(&name).ok_or("there is no such kind"))
+fn has_numbers(form: FieldForm) -> bool {
+    use FieldForm::{Number, Rotation, Value, Vector};
+    matches!(form, Number | Vector | Rotation | Value)
 }
 
-/// One word of the value of a parameter.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum SettingWord {
-    Number(f32),
-    Off,
-}
-
-fn setting_word(text: &str) -> Result<SettingWord, String> {
-    if text == "off" {
-        return Ok(SettingWord::Off);
-    }
-    let number = text.parse().map_err(|_| "it must be a number or \"off\"".to_owned());
-    number.map(SettingWord::Number)
-}
-
-impl SetArgs {
-    /// Value that the words form together.
-    pub(crate) fn value(&self) -> Result<ParameterValue, &'static str> {
-        use SettingWord::{Number, Off};
-        match *self.values {
-            [Off] => Ok(ParameterValue::Off),
-            [Number(number)] => Ok(ParameterValue::Number(number)),
-            [Number(x), Number(y), Number(z)] => Ok(ParameterValue::Vector([x, y, z])),
-            _ => Err("VALUE must be one number, three numbers for a vector, or \"off\" alone"),
+/// The argument of a field. An index, a word and the one point that a command is about have no option.
+fn argument(info: &ActionInfo, field: &FieldInfo) -> Arg {
+    let name = field.argument();
+    let arg = Arg::new(field.name).help(help(field)).value_name(name.to_uppercase());
+    let is_positional = match field.form {
+        FieldForm::Vector => matches!(field.name, "target" | "center" | "translation"),
+        FieldForm::Number | FieldForm::Rotation | FieldForm::Flag | FieldForm::Path => false,
+        _ => !field.is_optional,
+    };
+    let axes = |axes: &str| axes_of(if is_positional { "" } else { &name[..1] }, axes);
+    let arg = match field.form {
+        FieldForm::Whole if field.is_nonzero => {
+            arg.value_parser(json(whole::<u32>(1..=u32::MAX.into())))
         }
+        FieldForm::Whole => arg.value_parser(json(index)),
+        FieldForm::Long => arg.value_parser(json(whole::<u64>(0..=u64::MAX))),
+        FieldForm::Number if is_time(field) => {
+            let seconds = seconds_up_to(OVER_S_MAX);
+            let parser = json(move |text| seconds(text).map(PlainF32));
+            arg.value_name("TIME").value_parser(parser)
+        }
+        FieldForm::Number => arg.value_parser(json(plain_number)),
+        FieldForm::Vector => arg.value_names(axes("XYZ")).value_parser(json(plain_number)),
+        FieldForm::Rotation => arg.value_names(axes("XYZW")).value_parser(json(plain_number)),
+        FieldForm::Flag => arg.action(ArgAction::SetTrue),
+        FieldForm::Kind => arg.value_parser(one_of(ConstraintKind::ALL.map(ConstraintKind::name))),
+        FieldForm::Object => arg.value_parser(one_of(MovedObject::ALL.map(MovedObject::name))),
+        FieldForm::Value => {
+            let help = "A number, three numbers for a vector, or \"off\"";
+            arg.help(help).num_args(1..=3).value_parser(json(setting_word))
+        }
+        FieldForm::Path => arg.value_name("FILE").value_parser(ValueParser::path_buf()),
+        FieldForm::Text if info.name == "set" => {
+            arg.help(parameters_help()).value_parser(json(parameter_name))
+        }
+        FieldForm::Text | FieldForm::Contents | FieldForm::Hash => {
+            arg.value_parser(NonEmptyStringValueParser::new().map(Value::from))
+        }
+    };
+    match (info.name, field.name) {
+        ("step", "count") => return arg.default_value("1"),
+        ("cut_segment", "direction") => {
+            return arg.long(field.name).default_values(["0", "0", "1"]);
+        }
+        ("rewind", "back_steps") => {
+            return Arg::new(TIME).value_name("TIME").value_parser(time).help(
+                "Simulated time to go back, such as 2s or 500ms. Steps that an earlier rewind has left behind do not \
+                 count",
+            );
+        }
+        _ => {}
+    }
+    let arg = arg.required(!field.is_optional);
+    if is_positional { arg } else { arg.long(name.replace('_', "-")) }
+}
+
+/// Names of the numbers of a vector, after the initial of its option.
+fn axes_of(initial: &str, axes: &str) -> Vec<String> {
+    axes.chars().map(|axis| format!("{}{axis}", initial.to_uppercase())).collect()
+}
+
+fn is_time(field: &FieldInfo) -> bool {
+    field.form == FieldForm::Number && field.argument() != field.name
+}
+
+/// Meaning of a field with its default.
+fn help(field: &FieldInfo) -> String {
+    let meaning = field.meaning.split(" `None` means").next().unwrap_or_default();
+    let unit = if is_time(field) { "; also with a unit, such as 100ms" } else { "" };
+    let default = match field.default {
+        "" => String::new(),
+        default => format!(" [default: {default}]"),
+    };
+    format!("{}{unit}{default}", meaning.trim_end_matches('.'))
+}
+
+/// Parser of a value that becomes a field in JSON.
+fn json<T: Serialize>(
+    parse: impl Fn(&str) -> Result<T, String> + Clone + Send + Sync + 'static,
+) -> ValueParser {
+    ValueParser::new(move |text: &str| {
+        serde_json::to_value(parse(text)?).map_err(|error| error.to_string())
+    })
+}
+
+/// Parser of one of the names, which the help lists.
+fn one_of<const COUNT: usize>(names: [&'static str; COUNT]) -> ValueParser {
+    PossibleValuesParser::new(names).map(Value::from).into()
+}
+
+fn plain_number(text: &str) -> Result<PlainF32, String> {
+    number(text).map(PlainF32)
+}
+
+/// Parses one word of the value of a parameter; `None` is off.
+fn setting_word(text: &str) -> Result<Option<PlainF32>, String> {
+    if text == "off" {
+        return Ok(None);
+    }
+    let number = plain_number(text).map_err(|_| "it must be a number or \"off\"".to_owned())?;
+    Ok(Some(number))
+}
+
+/// Value of a field, from the words of its argument.
+fn value(field: &FieldInfo, given: &ArgMatches) -> Result<Option<Value>, &'static str> {
+    if field.form == FieldForm::Flag {
+        return Ok(given.get_flag(field.name).then_some(true.into()));
+    }
+    let words = given.try_get_many::<Value>(field.name).ok().flatten();
+    let words: Vec<_> = words.into_iter().flatten().cloned().collect();
+    Ok(match (field.form, words.len()) {
+        (_, 0) => None,
+        (_, 1) => words.into_iter().next(),
+        (FieldForm::Value, _) if words.len() == 2 || words.contains(&Value::Null) => {
+            return Err("VALUE must be one number, three numbers for a vector, or \"off\" alone");
+        }
+        _ => Some(words.into()),
+    })
+}
+
+/// Parses the name of a parameter. The node judges unknown names; one with a value is two words in one.
+fn parameter_name(text: &str) -> Result<String, String> {
+    let Some((name, value)) = text.split_once('=') else { return Ok(text.to_owned()) };
+    let Some(parameter) = Parameter::from_name(name) else {
+        return Err("the name of a parameter has no '='".to_owned());
+    };
+    let info = parameter.info();
+    let is_scalar = info.form != ValueForm::Vector;
+    let is_valid = is_scalar && value.parse().is_ok_and(|number| info.range.contains(number));
+    let value = if is_valid { value.to_owned() } else { example(info) };
+    Err(format!(
+        "name and value are separate words, as in `ctl set {name} {value}` (allowed: {})",
+        info.allowed_values()
+    ))
+}
+
+/// A value of a parameter: the default, or one in its range.
+fn example(info: &ParameterInfo) -> String {
+    match info.default {
+        ParameterValue::Vector(vector) => vector.map(|number| number.to_string()).join(" "),
+        ParameterValue::Number(number) => number.to_string(),
+        ParameterValue::Off if info.range.contains(0.5) => "0.5".to_owned(),
+        ParameterValue::Off => "2".to_owned(),
+    }
+}
+
+/// Names of the parameters, with their units.
+fn parameters_help() -> String {
+    let name = |info: &ParameterInfo| match info.unit {
+        "" => info.name.to_owned(),
+        unit => format!("{} ({unit})", info.name),
+    };
+    PARAMETERS.iter().map(name).collect::<Vec<_>>().join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_behind_an_equals_sign_is_refused_with_an_example_and_the_range() {
+        let error = |text| parameter_name(text).unwrap_err();
+        assert_eq!(
+            error("damping=3"),
+            "name and value are separate words, as in `ctl set damping 3` (allowed: a number >= 0, or off \
+             for 0)"
+        );
+        assert!(error("damping=-3").contains("`ctl set damping 0` (allowed: "));
+        for info in PARAMETERS {
+            let number = example(&info).split(' ').next().unwrap().parse().unwrap();
+            assert!(info.range.contains(number), "{}", info.name);
+        }
+        for vector in ["gravity=1,2,3", "gravity=[1,2,3]", "gravity="] {
+            assert!(
+                error(vector).contains("`ctl set gravity 0 -9.81 0` (allowed: three numbers, each")
+            );
+        }
+        assert_eq!(error("weight=3"), "the name of a parameter has no '='");
+        assert_eq!(parameter_name("weight"), Ok("weight".to_owned()));
     }
 }

@@ -5,91 +5,40 @@ use std::path::{self, Path};
 use std::time::Duration;
 
 use anyhow::{Context, anyhow};
+use serde_json::Value;
 use sim_contract::clock::SECOND_NS;
-use sim_contract::{Action, KindFilter, PathError, PathPoint, Text};
+use sim_contract::{Action, MovedObject, PathError, PathPoint};
 
-use crate::args::{CommandVerb, FollowArgs, PoseArgs, RewindArgs, SetArgs};
+use crate::args::CommandVerb;
 use crate::scene_source;
 
-/// Action of a command. `rate_hz` returns the rate of the node.
+/// Actions of a command. `rate_hz` returns the rate of the node.
 pub(super) fn from_verb(
     verb: &CommandVerb,
     rate_hz: impl FnOnce() -> anyhow::Result<u32>,
 ) -> anyhow::Result<Vec<Action>> {
-    Ok(vec![match verb {
-        CommandVerb::Pin { particle } => Action::Pin { particle: *particle },
-        CommandVerb::Unpin { particle } => Action::Unpin { particle: *particle },
-        CommandVerb::Grab(args) => Action::Grab {
-            particle: args.particle,
-            target: args.target.vector(),
-            over_s: args.over,
-        },
-        CommandVerb::Move(args) => Action::Move {
-            particle: args.particle,
-            target: args.target.vector(),
-            over_s: args.over,
-        },
-        CommandVerb::Release { particle, force } => {
-            Action::Release { particle: *particle, force: *force }
-        }
-        CommandVerb::Push(args) => Action::Push {
-            center: args.center.vector(),
-            radius: args.radius,
-            delta: numbers(&args.delta)?,
-            limit: args.limit,
-        },
-        CommandVerb::Cut { constraint } => Action::Cut { constraint: *constraint },
-        CommandVerb::CutRadius(args) => {
-            Action::CutRadius { center: args.center.vector(), radius: args.radius }
-        }
-        CommandVerb::CutSegment(args) => Action::CutSegment {
-            from: numbers(&args.from)?,
-            to: numbers(&args.to)?,
-            direction: numbers(&args.direction)?,
-        },
-        CommandVerb::MoveAnchor { anchor, pose, over } => {
-            let (translation, rotation) = translation_and_rotation(pose)?;
-            Action::MoveAnchor { anchor: *anchor, translation, rotation, over_s: over.over }
-        }
-        CommandVerb::MoveCollider { collider, pose, over } => {
-            let (translation, rotation) = translation_and_rotation(pose)?;
-            Action::MoveCollider { collider: *collider, translation, rotation, over_s: over.over }
-        }
-        CommandVerb::DriveBody(args) => {
-            let (translation, rotation) = translation_and_rotation(&args.pose)?;
-            Action::DriveBody {
-                collider: args.collider,
-                translation,
-                rotation,
-                velocity: numbers(&args.velocity)?,
-                angular_velocity: numbers(&args.angular_velocity)?,
-                force: numbers(&args.force)?,
-                torque: numbers(&args.torque)?,
-            }
-        }
-        CommandVerb::Set(args) => setting(args)?,
-        CommandVerb::Load { scene } => Action::Load { scene: scene_text(scene)? },
-        CommandVerb::Pause => Action::Pause,
-        CommandVerb::Resume => Action::Resume,
-        CommandVerb::Step { count } => Action::Step { count: *count },
-        CommandVerb::Reset => Action::Reset,
-        CommandVerb::Mark { text: words } => Action::Mark { text: text(words)? },
-        CommandVerb::Rewind(RewindArgs { time, to_step }) => Action::Rewind {
-            to_step: *to_step,
-            back_steps: match time {
-                Some(time) => Some(steps_in(*time, rate_hz()?)),
-                None => None,
-            },
-        },
-        CommandVerb::Follow(args) => return follow(args),
-    }])
+    if let Some(path) = &verb.path {
+        return follow(verb, path);
+    }
+    let mut fields = verb.fields.clone();
+    if let Some(Value::String(scene)) = fields.get_mut("scene") {
+        *scene = scene_text(scene)?;
+    }
+    if let Some(time) = verb.time {
+        fields.insert("back_steps".to_owned(), steps_in(time, rate_hz()?).into());
+    }
+    let action = serde_json::from_value(fields.into());
+    Ok(vec![action.with_context(|| format!("{} is no command", verb.info.name))?])
 }
 
-fn follow(args: &FollowArgs) -> anyhow::Result<Vec<Action>> {
-    let FollowArgs { object, index, path, append } = args;
+fn follow(verb: &CommandVerb, path: &Path) -> anyhow::Result<Vec<Action>> {
+    let field = |name: &str| verb.fields.get(name).cloned().unwrap_or_default();
+    let object: MovedObject = serde_json::from_value(field("object"))?;
+    let index = serde_json::from_value(field("object_index"))?;
     let rows = rows(path)?;
     let points: Vec<_> = rows.iter().map(|row| row.point).collect();
-    Action::follow(*object, *index, &points, *append).map_err(|error| match error {
+    let append = verb.fields.contains_key("append");
+    Action::follow(object, index, &points, append).map_err(|error| match error {
         PathError::Point { index, fault } => {
             anyhow!("{}:{}: {fault}", path.display(), rows[index].line)
         }
@@ -128,56 +77,36 @@ fn steps_in(time: Duration, rate_hz: u32) -> u32 {
     u32::try_from(steps).unwrap_or(u32::MAX)
 }
 
-fn translation_and_rotation(pose: &PoseArgs) -> anyhow::Result<([f32; 3], [f32; 4])> {
-    Ok(([pose.x, pose.y, pose.z], numbers(&pose.rotation)?))
-}
-
-/// The numbers as an array; clap has counted them already.
-fn numbers<const COUNT: usize>(values: &[f32]) -> anyhow::Result<[f32; COUNT]> {
-    <[f32; COUNT]>::try_from(values)
-        .with_context(|| format!("expected {COUNT} numbers, got {}", values.len()))
-}
-
 /// Name of a built-in scene, or absolute path of a file: the node may run in another folder. Checks
 /// the scene first, because an outcome has no room for the place of an error.
-fn scene_text(source: &str) -> anyhow::Result<Text> {
+fn scene_text(source: &str) -> anyhow::Result<String> {
     scene_source::load(source)?;
     if !sim_solver::scene::is_path(source) {
-        return text(source);
+        return Ok(source.to_owned());
     }
     let path = path::absolute(source)
         .with_context(|| format!("{source}: cannot make the path absolute"))?;
-    text(path.to_str().with_context(|| format!("{}: the path is not UTF-8", path.display()))?)
-}
-
-/// Text of a command, which must not be cut short: it would mean something else.
-fn text(text: &str) -> anyhow::Result<Text> {
-    Text::new(text).with_context(|| format!("'{text}' does not fit into a command"))
-}
-
-fn setting(args: &SetArgs) -> anyhow::Result<Action> {
-    Ok(Action::Set {
-        parameter: text(&args.parameter)?,
-        value: args.value().map_err(anyhow::Error::msg)?,
-        constraint_kind: args.kind.map(KindFilter::Known),
-        block: args.block,
-        collider: args.collider,
-    })
+    let text = path.to_str().map(str::to_owned);
+    text.with_context(|| format!("{}: the path is not UTF-8", path.display()))
 }
 
 #[cfg(test)]
 mod tests {
-    use sim_contract::{ConstraintKind, MovedObject, ParameterValue, Part};
+    use sim_contract::{ConstraintKind, MovedObject, ParameterValue, Part, Text};
 
     use super::*;
     use crate::args::{CtlVerb, Verb, try_parse};
 
-    fn action(line: &str) -> Action {
+    fn actions(line: &str) -> anyhow::Result<Vec<Action>> {
         let words = ["sim-node", "ctl"].into_iter().chain(line.split_whitespace());
         let args = try_parse(words).unwrap_or_else(|error| panic!("{line}: {error}"));
         let Some(Verb::Ctl(ctl)) = args.verb else { panic!("{line}: not ctl") };
         let CtlVerb::Command(verb) = ctl.verb else { panic!("{line}: not a command") };
-        let actions = from_verb(&verb, || Ok(240)).unwrap();
+        from_verb(&verb, || Ok(240))
+    }
+
+    fn action(line: &str) -> Action {
+        let actions = actions(line).unwrap();
         let [action] = actions[..] else { panic!("{line}: {actions:?}") };
         action
     }
@@ -239,9 +168,7 @@ mod tests {
         let file = std::env::temp_dir().join(format!("catenary-path-{}.csv", std::process::id()));
         let read = |text: &str| {
             fs::write(&file, text).unwrap();
-            let path = file.clone();
-            let args = FollowArgs { object: MovedObject::Collider, index: 0, path, append: false };
-            from_verb(&CommandVerb::Follow(args), || Ok(240))
+            actions(&format!("follow collider 0 --path {}", file.display()))
         };
         let actions = read("# time x y z\n0, 1, 2, 3\n\n0.5 1 2 3 0 0 0.6 0.8\n").unwrap();
         let first = PathPoint { translation: [1.0, 2.0, 3.0], ..PathPoint::AT_LOAD };
@@ -296,10 +223,9 @@ mod tests {
         assert_eq!(action("load rope"), Action::Load { scene: Text::cut("rope") });
         let Action::Load { scene } = action("load ./scenes/rope.toml") else { panic!("no load") };
         assert!(scene.as_str().starts_with('/') && scene.as_str().ends_with("/scenes/rope.toml"));
-        let verb = CommandVerb::Load { scene: "nix".to_owned() };
-        let error = from_verb(&verb, || Ok(240)).unwrap_err().to_string();
+        let error = actions("load nix").unwrap_err().to_string();
         assert!(error.starts_with("there is no built-in scene 'nix'"), "{error}");
-        let error = format!("{:#}", text(&"x".repeat(161)).unwrap_err());
+        let error = format!("{:#}", actions(&format!("mark {}", "x".repeat(161))).unwrap_err());
         assert!(error.ends_with("the text has 161 bytes (allowed: at most 160)"), "{error}");
     }
 }
