@@ -855,36 +855,11 @@ catenary_result catenary_check_node(const catenary_client *client);
 // refused by `catenary_attach`.
 uint32_t catenary_contract_version(void);
 
-// Holds a particle in place.
-catenary_command catenary_command_pin(uint32_t particle);
-
-// Frees a pinned particle, from rest.
-catenary_command catenary_command_unpin(uint32_t particle);
-
-// Grabs a particle, and drives it on a straight line to `target` (3 numbers, in m) within `over_s`
-// seconds, 0 to 3600.
-catenary_command catenary_command_grab(uint32_t particle, const float *target, float over_s);
-
-// Drives a particle that this client has grabbed to a new target, as in `catenary_command_grab`.
-catenary_command catenary_command_move(uint32_t particle, const float *target, float over_s);
-
 // Releases a particle that this client has grabbed, with the velocity of its last motion.
 catenary_command catenary_command_release(uint32_t particle);
 
 // Releases a grabbed particle, whichever client has grabbed it.
 catenary_command catenary_command_release_forced(uint32_t particle);
-
-// Pauses the node.
-catenary_command catenary_command_pause(void);
-
-// Resumes a paused node.
-catenary_command catenary_command_resume(void);
-
-// Makes a paused node compute `count` steps.
-catenary_command catenary_command_step(uint32_t count);
-
-// Restores the initial state. The step number continues.
-catenary_command catenary_command_reset(void);
 
 // Sets the velocity of the free particles within a sphere (`center`: 3 numbers; both in m) to `delta`
 // (3 numbers, in m per step) times the rate.
@@ -897,18 +872,6 @@ catenary_command catenary_command_push_limited(const float *center,
                                                float radius,
                                                const float *delta,
                                                float limit);
-
-// Tears a constraint.
-catenary_command catenary_command_cut(uint32_t constraint);
-
-// Tears all constraints with an end within a sphere (`center`: 3 numbers; both in m).
-catenary_command catenary_command_cut_radius(const float *center, float radius);
-
-// Tears all constraints that cross the segment between two points (3 numbers each, in m), extended without
-// end along plus and minus `direction` (3 numbers; 0 0 1 in a planar scene).
-catenary_command catenary_command_cut_segment(const float *from,
-                                              const float *to,
-                                              const float *direction);
 
 // Moves an anchor to a pose, where it stays: by the end of the next step, or in the time that
 // `catenary_command_with_over` gives. `translation` (3 numbers, in m) and `rotation` (quaternion x, y, z, w) are relative to
@@ -984,9 +947,6 @@ catenary_command catenary_command_for_block(catenary_command set,
 catenary_command catenary_command_for_collider(catenary_command set,
                                                uint32_t collider);
 
-// Loads a built-in scene, or a file that the node can read; at most 160 bytes.
-catenary_command catenary_command_load(const char *scene);
-
 // Puts the nearest kept state at or before a step of this run in place; `catenary_command_rewound_step` of the outcome's command
 // returns its step.
 catenary_command catenary_command_rewind_to(uint64_t step);
@@ -998,7 +958,72 @@ uint64_t catenary_command_rewound_step(catenary_command rewind);
 // Puts the nearest kept state at least a number of steps ago in place.
 catenary_command catenary_command_rewind_back(uint32_t steps);
 
-// Marks the step in recordings, with a text of 1 to 160 bytes.
+// Holds a particle in place.
+//
+// - `particle`: Index of the particle.
+catenary_command catenary_command_pin(uint32_t particle);
+
+// Frees a pinned particle. Its velocity is 0.
+//
+// - `particle`: Index of the particle.
+catenary_command catenary_command_unpin(uint32_t particle);
+
+// Grabs a particle, which moves along a straight line to a target.
+//
+// - `particle`: Index of the particle.
+// - `target` (3 numbers): Target in m, relative to the scene's origin.
+// - `over_s`: Time to the target in seconds, 0..=3600, rounded up to whole steps.
+catenary_command catenary_command_grab(uint32_t particle, const float *target, float over_s);
+
+// Sets a new target for a particle that this client has grabbed.
+//
+// - `particle`: Index of the particle.
+// - `target` (3 numbers): Target in m, relative to the scene's origin.
+// - `over_s`: Time to the target in seconds, 0..=3600, rounded up to whole steps.
+catenary_command catenary_command_move(uint32_t particle, const float *target, float over_s);
+
+// Pauses the node at this boundary.
+catenary_command catenary_command_pause(void);
+
+// Resumes a paused node.
+catenary_command catenary_command_resume(void);
+
+// Makes a paused node perform `count` steps.
+//
+// - `count`: Number of steps, 1 or more.
+catenary_command catenary_command_step(uint32_t count);
+
+// Restores the initial state as the state of the next step. The step number continues.
+catenary_command catenary_command_reset(void);
+
+// Tears a constraint.
+//
+// - `constraint`: Index of the constraint.
+catenary_command catenary_command_cut(uint32_t constraint);
+
+// Tears every constraint with an end inside a sphere.
+//
+// - `center` (3 numbers): Center of the sphere in m, relative to the scene's origin.
+// - `radius`: Radius of the sphere in m. An end at exactly this distance is outside.
+catenary_command catenary_command_cut_radius(const float *center, float radius);
+
+// Tears every constraint that crosses a strip: a segment extended to both sides.
+//
+// - `from` (3 numbers): Start of the segment in m, relative to the scene's origin.
+// - `to` (3 numbers): End of the segment in m, relative to the scene's origin.
+// - `direction` (3 numbers): Direction in which the segment extends to both sides without limit; [0, 0, 1] for a planar scene.
+catenary_command catenary_command_cut_segment(const float *from,
+                                              const float *to,
+                                              const float *direction);
+
+// Replaces the scene.
+//
+// - `scene`: Name of a built-in scene, or path of a file on the node's host.
+catenary_command catenary_command_load(const char *scene);
+
+// Marks the step in the log. Changes nothing else.
+//
+// - `text`: Text for people and for programs that read the log. Empty text is rejected.
 catenary_command catenary_command_mark(const char *text);
 
 // Reads the newest forces on colliders, anchors and pinned, grabbed or anchored particles, and waits only if

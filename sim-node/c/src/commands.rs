@@ -1,4 +1,4 @@
-//! Commands as values, for `catenary_request` and `catenary_send`.
+//! Commands as values, for `catenary_request` and `catenary_send`: those with options. The others are in `constructors.rs`.
 
 use std::ffi::c_char;
 
@@ -14,33 +14,20 @@ fn command(action: Option<Action>) -> Command {
     action.map_or_else(Command::default, |action| Command::new(0, 0, action))
 }
 
-fn short_text(pointer: *const c_char) -> Option<Text> {
+/// Encodes the action of these arguments, as [`command`] does.
+pub(crate) fn made(action: impl FnOnce() -> Option<Action>) -> Command {
+    command(action())
+}
+
+/// Changes the action of a command; `None` leaves the command as it is.
+fn changed(from: Command, change: impl FnOnce(&mut Action) -> Option<()>) -> Command {
+    let mut action = from.action();
+    let is_changed = change(&mut action).is_some();
+    if is_changed { Command::new(from.client_id, from.sequence, action) } else { from }
+}
+
+pub(crate) fn short_text(pointer: *const c_char) -> Option<Text> {
     Text::new(&text(pointer, "text").ok().flatten()?).ok()
-}
-
-/// Holds a particle in place.
-#[unsafe(no_mangle)]
-pub extern "C" fn catenary_command_pin(particle: u32) -> Command {
-    command(Some(Action::Pin { particle }))
-}
-
-/// Frees a pinned particle, from rest.
-#[unsafe(no_mangle)]
-pub extern "C" fn catenary_command_unpin(particle: u32) -> Command {
-    command(Some(Action::Unpin { particle }))
-}
-
-/// Grabs a particle, and drives it on a straight line to `target` (3 numbers, in m) within `over_s`
-/// seconds, 0 to 3600.
-#[unsafe(no_mangle)]
-pub extern "C" fn catenary_command_grab(particle: u32, target: *const f32, over_s: f32) -> Command {
-    command(numbers(target).map(|target| Action::Grab { particle, target, over_s }))
-}
-
-/// Drives a particle that this client has grabbed to a new target, as in `catenary_command_grab`.
-#[unsafe(no_mangle)]
-pub extern "C" fn catenary_command_move(particle: u32, target: *const f32, over_s: f32) -> Command {
-    command(numbers(target).map(|target| Action::Move { particle, target, over_s }))
 }
 
 /// Releases a particle that this client has grabbed, with the velocity of its last motion.
@@ -53,30 +40,6 @@ pub extern "C" fn catenary_command_release(particle: u32) -> Command {
 #[unsafe(no_mangle)]
 pub extern "C" fn catenary_command_release_forced(particle: u32) -> Command {
     command(Some(Action::Release { particle, force: true }))
-}
-
-/// Pauses the node.
-#[unsafe(no_mangle)]
-pub extern "C" fn catenary_command_pause() -> Command {
-    command(Some(Action::Pause))
-}
-
-/// Resumes a paused node.
-#[unsafe(no_mangle)]
-pub extern "C" fn catenary_command_resume() -> Command {
-    command(Some(Action::Resume))
-}
-
-/// Makes a paused node compute `count` steps.
-#[unsafe(no_mangle)]
-pub extern "C" fn catenary_command_step(count: u32) -> Command {
-    command(Some(Action::Step { count }))
-}
-
-/// Restores the initial state. The step number continues.
-#[unsafe(no_mangle)]
-pub extern "C" fn catenary_command_reset() -> Command {
-    command(Some(Action::Reset))
 }
 
 /// Sets the velocity of the free particles within a sphere (`center`: 3 numbers; both in m) to `delta`
@@ -104,30 +67,6 @@ pub extern "C" fn catenary_command_push_limited(
 fn push(center: *const f32, radius: f32, delta: *const f32, limit: Option<f32>) -> Command {
     let pair = numbers(center).zip(numbers(delta));
     command(pair.map(|(center, delta)| Action::Push { center, radius, delta, limit }))
-}
-
-/// Tears a constraint.
-#[unsafe(no_mangle)]
-pub extern "C" fn catenary_command_cut(constraint: u32) -> Command {
-    command(Some(Action::Cut { constraint }))
-}
-
-/// Tears all constraints with an end within a sphere (`center`: 3 numbers; both in m).
-#[unsafe(no_mangle)]
-pub extern "C" fn catenary_command_cut_radius(center: *const f32, radius: f32) -> Command {
-    command(numbers(center).map(|center| Action::CutRadius { center, radius }))
-}
-
-/// Tears all constraints that cross the segment between two points (3 numbers each, in m), extended without
-/// end along plus and minus `direction` (3 numbers; 0 0 1 in a planar scene).
-#[unsafe(no_mangle)]
-pub extern "C" fn catenary_command_cut_segment(
-    from: *const f32,
-    to: *const f32,
-    direction: *const f32,
-) -> Command {
-    let all = numbers(from).zip(numbers(to)).zip(numbers(direction));
-    command(all.map(|((from, to), direction)| Action::CutSegment { from, to, direction }))
 }
 
 /// Moves an anchor to a pose, where it stays: by the end of the next step, or in the time that
@@ -162,16 +101,13 @@ pub extern "C" fn catenary_command_move_collider(
 /// seconds: 0 to 3600, rounded up to whole steps, at least one. Other commands stay as they are.
 #[unsafe(no_mangle)]
 pub extern "C" fn catenary_command_with_over(motion: Command, over_s: f32) -> Command {
-    let action = match motion.action() {
-        Action::MoveAnchor { anchor, translation, rotation, .. } => {
-            Action::MoveAnchor { anchor, translation, rotation, over_s }
+    changed(motion, |action| match action {
+        Action::MoveAnchor { over_s: own, .. } | Action::MoveCollider { over_s: own, .. } => {
+            *own = over_s;
+            Some(())
         }
-        Action::MoveCollider { collider, translation, rotation, .. } => {
-            Action::MoveCollider { collider, translation, rotation, over_s }
-        }
-        _ => return motion,
-    };
-    command(Some(action))
+        _ => None,
+    })
 }
 
 /// Leads an object (`object` is a `catenary_moved_object`) along the points of `catenary_command_with_point`: an anchor, a
@@ -214,10 +150,13 @@ pub extern "C" fn catenary_command_with_point(
 /// commands stay as they are.
 #[unsafe(no_mangle)]
 pub extern "C" fn catenary_command_appended(follow: Command) -> Command {
-    let Action::Follow { object, object_index, path, .. } = follow.action() else {
-        return follow;
-    };
-    command(Some(Action::Follow { object, object_index, path, append: true }))
+    changed(follow, |action| match action {
+        Action::Follow { append, .. } => {
+            *append = true;
+            Some(())
+        }
+        _ => None,
+    })
 }
 
 /// Moves a body through the next step, with its mass and inertia. `translation` and `rotation` are as in
@@ -251,25 +190,14 @@ pub extern "C" fn catenary_command_with_wrench(
     force: *const f32,
     torque: *const f32,
 ) -> Command {
-    let Action::DriveBody { collider, translation, rotation, velocity, angular_velocity, .. } =
-        command.action()
-    else {
-        return command;
-    };
-    let (force, torque) = (numbers(force).unwrap_or_default(), numbers(torque).unwrap_or_default());
-    Command::new(
-        command.client_id,
-        command.sequence,
-        Action::DriveBody {
-            collider,
-            translation,
-            rotation,
-            velocity,
-            angular_velocity,
-            force,
-            torque,
-        },
-    )
+    changed(command, |action| match action {
+        Action::DriveBody { force: own_force, torque: own_torque, .. } => {
+            *own_force = numbers(force).unwrap_or_default();
+            *own_torque = numbers(torque).unwrap_or_default();
+            Some(())
+        }
+        _ => None,
+    })
 }
 
 /// No rotation.
@@ -300,10 +228,14 @@ pub extern "C" fn catenary_command_set_off(parameter: *const c_char) -> Command 
 /// `catenary_constraint_kind`). Any other command is returned unchanged.
 #[unsafe(no_mangle)]
 pub extern "C" fn catenary_command_for_kind(set: Command, constraint_kind: u32) -> Command {
-    let Action::Set { parameter, value, .. } = set.action() else { return set };
-    let constraint_kind = Some(KindFilter::from_number(constraint_kind));
-    let (block, collider) = (None, None);
-    command(Some(Action::Set { parameter, value, constraint_kind, block, collider }))
+    changed(set, |action| match action.for_part(Part::All) {
+        Action::Set { parameter, value, block, collider, .. } => {
+            let constraint_kind = Some(KindFilter::from_number(constraint_kind));
+            *action = Action::Set { parameter, value, constraint_kind, block, collider };
+            Some(())
+        }
+        _ => None,
+    })
 }
 
 /// Returns a command that sets "bending", for the bends of one generated block only: the index of the
@@ -322,21 +254,15 @@ pub extern "C" fn catenary_command_for_collider(set: Command, collider: u32) -> 
 }
 
 fn for_part(set: Command, part: Part) -> Command {
-    match set.action() {
-        action @ Action::Set { .. } => command(Some(action.for_part(part))),
-        _ => set,
-    }
+    changed(set, |action| {
+        *action = action.for_part(part);
+        matches!(action, Action::Set { .. }).then_some(())
+    })
 }
 
 fn set(parameter: *const c_char, value: Option<ParameterValue>) -> Command {
     let pair = short_text(parameter).zip(value);
     command(pair.map(|(parameter, value)| Action::set(parameter.as_str(), value)))
-}
-
-/// Loads a built-in scene, or a file that the node can read; at most 160 bytes.
-#[unsafe(no_mangle)]
-pub extern "C" fn catenary_command_load(scene: *const c_char) -> Command {
-    command(short_text(scene).map(|scene| Action::Load { scene }))
 }
 
 /// Puts the nearest kept state at or before a step of this run in place; `catenary_command_rewound_step` of the outcome's command
@@ -360,10 +286,4 @@ pub extern "C" fn catenary_command_rewound_step(rewind: Command) -> u64 {
 #[unsafe(no_mangle)]
 pub extern "C" fn catenary_command_rewind_back(steps: u32) -> Command {
     command(Some(Action::Rewind { to_step: None, back_steps: Some(steps) }))
-}
-
-/// Marks the step in recordings, with a text of 1 to 160 bytes.
-#[unsafe(no_mangle)]
-pub extern "C" fn catenary_command_mark(text: *const c_char) -> Command {
-    command(short_text(text).map(|text| Action::Mark { text }))
 }

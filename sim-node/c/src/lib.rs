@@ -6,11 +6,14 @@
 //!
 //! - No panic crosses the boundary: [`outcome::guard`] turns it into a result.
 //! - Handles are numbers, not addresses ([`handles`]), so a handle that was released is an error.
+//! - The constructors of most commands are generated from the table of actions, by the test of the header.
 //! - The few reads through pointers of the program are in [`pointers`].
 
 mod attached;
 mod client;
 mod commands;
+#[rustfmt::skip]
+mod constructors;
 mod forces;
 mod handles;
 mod lists;
@@ -24,6 +27,7 @@ mod snapshots;
 pub use attached::ClientHandle;
 pub use client::*;
 pub use commands::*;
+pub use constructors::*;
 pub use forces::*;
 pub use lists::*;
 pub use lockstep::*;

@@ -1,5 +1,6 @@
-//! The header is generated from the Rust types, and compiles as C99 and as C++17 without a warning. To
-//! update it after a change: `UPDATE_GOLDEN=1 cargo test -p sim-c --test integration header`
+//! The header is generated from the Rust types, and compiles as C99 and as C++17 without a warning. The constructors of
+//! commands are generated from the table of actions. To update both after a change:
+//! `UPDATE_GOLDEN=1 cargo test -p sim-c --test integration header`
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -10,11 +11,11 @@ use cbindgen::{
     Builder, Config, DocumentationStyle, EnumConfig, ItemType, Language, RenameRule, Style,
 };
 use sim_contract::{
-    Action, BendState, CONTRACT_VERSION, ColliderState, CollidersHeader, ConstraintState, ForceRow,
-    ForcesHeader, LoadHeader, MEMBER_CHANGES_KEPT, MEMBERS_MAX, NodeStatus, OUTCOME_FLAG_CONTROL,
-    OUTCOME_FLAG_DISCONNECTED, OUTCOME_FLAG_NEW_RUN, Outcome, ParameterState, ParametersHeader,
-    ParticleFlags, ParticleState, SnapshotFlags, SnapshotHeader, StatusFlags, TearsHeader, Text,
-    TornConstraint, Triangle,
+    ACTIONS, Action, BendState, CONTRACT_VERSION, ColliderState, CollidersHeader, ConstraintState,
+    FieldForm, FieldInfo, ForceRow, ForcesHeader, LoadHeader, MEMBER_CHANGES_KEPT, MEMBERS_MAX,
+    NodeStatus, OUTCOME_FLAG_CONTROL, OUTCOME_FLAG_DISCONNECTED, OUTCOME_FLAG_NEW_RUN, Outcome,
+    ParameterState, ParametersHeader, ParticleFlags, ParticleState, SnapshotFlags, SnapshotHeader,
+    StatusFlags, TearsHeader, Text, TornConstraint, Triangle,
 };
 
 /// Types with their names in the header. The last ones are in no signature: numbers in messages.
@@ -197,18 +198,85 @@ fn adapt(line: &str) -> String {
 }
 
 #[test]
-fn the_committed_header_is_that_of_the_rust_types() {
-    let file = folder().join("include/catenary.h");
-    let header = generate();
+fn the_committed_files_are_those_of_the_rust_types() {
+    // In this order: the header declares the constructors.
+    check("src/constructors.rs", &constructors());
+    check("include/catenary.h", &generate());
+}
+
+fn check(file: &str, expected: &str) {
+    let path = folder().join(file);
     if std::env::var_os("UPDATE_GOLDEN").is_some() {
-        std::fs::write(&file, &header).unwrap();
+        std::fs::write(&path, expected).unwrap();
     }
-    let committed = std::fs::read_to_string(&file).unwrap();
-    let differs = committed.lines().zip(header.lines()).find(|(old, new)| old != new);
+    let committed = std::fs::read_to_string(&path).unwrap();
+    let differs = committed.lines().zip(expected.lines()).find(|(old, new)| old != new);
     assert!(
-        committed == header,
-        "run UPDATE_GOLDEN=1 cargo test -p sim-c --test integration header; first difference: {differs:?}"
+        committed == expected,
+        "{file}: run UPDATE_GOLDEN=1 cargo test -p sim-c --test integration header; first difference: {differs:?}"
     );
+}
+
+/// Commands with options that are functions of their own, in `src/commands.rs`, and a restore, which carries a state.
+const WITH_OPTIONS: [&str; 9] = [
+    "release",
+    "push",
+    "move_anchor",
+    "move_collider",
+    "set",
+    "rewind",
+    "restore",
+    "drive_body",
+    "follow",
+];
+
+/// A function for each other command, with an argument for each field.
+fn constructors() -> String {
+    let mut text = "//! The constructors of commands whose arguments are their fields. Generated from the table of actions; do not \
+        edit.\n\nuse std::ffi::c_char;\n\nuse sim_contract::{Action, Command};\n\nuse crate::commands::{made, short_text};\n\
+        use crate::pointers::numbers;\n"
+        .to_owned();
+    for info in ACTIONS.iter().filter(|info| !WITH_OPTIONS.contains(&info.name)) {
+        writeln!(text, "\n/// {}", info.meaning).unwrap();
+        for (index, field) in info.fields.iter().enumerate() {
+            let line = if index == 0 { "///\n" } else { "" };
+            let (_, form, _) = argument(field);
+            writeln!(text, "{line}/// - `{}`{form}: {}", field.name, field.meaning).unwrap();
+        }
+        let arguments =
+            info.fields.iter().map(|field| format!("{}: {}", field.name, argument(field).0));
+        let values = info.fields.iter().map(|field| format!("{}{}", field.name, argument(field).2));
+        let (arguments, values): (Vec<_>, Vec<_>) = (arguments.collect(), values.collect());
+        let variant: String = info.name.split('_').map(capitalized).collect();
+        let fields =
+            if values.is_empty() { String::new() } else { format!(" {{ {} }}", values.join(", ")) };
+        writeln!(
+            text,
+            "#[unsafe(no_mangle)]\npub extern \"C\" fn catenary_command_{}({}) -> Command {{ \
+                made(|| Some(Action::{variant}{fields})) }}",
+            info.name,
+            arguments.join(", "),
+        )
+        .unwrap();
+    }
+    text
+}
+
+fn capitalized(word: &str) -> String {
+    word[..1].to_uppercase() + &word[1..]
+}
+
+/// Type of an argument, its form in words, and the text that makes it the value of its field.
+fn argument(field: &FieldInfo) -> (&'static str, &'static str, String) {
+    let name = field.name;
+    match (field.form, field.size_bytes) {
+        (FieldForm::Whole, 4) => ("u32", "", String::new()),
+        (FieldForm::Number, 4) => ("f32", "", String::new()),
+        (FieldForm::Vector, _) => ("*const f32", " (3 numbers)", format!(": numbers({name})?")),
+        (FieldForm::Rotation, _) => ("*const f32", " (4 numbers)", format!(": numbers({name})?")),
+        (FieldForm::Text, _) => ("*const c_char", "", format!(": short_text({name})?")),
+        _ => panic!("{name} has no argument in C: write the constructor by hand"),
+    }
 }
 
 /// Compiles a file that includes a header, and nothing else.
