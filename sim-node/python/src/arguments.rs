@@ -9,7 +9,11 @@ use pyo3::prelude::*;
 use crate::convert::shown;
 
 /// Returns the value of an argument.
-fn whole<'py, T>(value: &Bound<'py, PyAny>, name: &str, range: &RangeInclusive<T>) -> PyResult<T>
+pub(crate) fn whole<'py, T>(
+    value: &Bound<'py, PyAny>,
+    name: &str,
+    range: &RangeInclusive<T>,
+) -> PyResult<T>
 where
     T: for<'a> FromPyObject<'a, 'py, Error = PyErr> + PartialOrd + Display,
 {
@@ -47,22 +51,15 @@ macro_rules! optional_arguments {
 }
 
 arguments! {
-    anchor "anchor": u32, 0..=u32::MAX;
-    collider "collider": u32, 0..=u32::MAX;
-    constraint "constraint": u32, 0..=u32::MAX;
     count "count": u64, 0..=u64::MAX;
-    particle "particle": u32, 0..=u32::MAX;
     sequence "sequence": u64, 0..=u64::MAX;
     every "every": u32, 1..=u32::MAX;
-    node_steps "count": u32, 0..=u32::MAX;
     step "step": u64, 0..=u64::MAX;
     threads "threads": usize, 1..=usize::from(sim_solver::THREADS_MAX);
 }
 
 optional_arguments! {
-    back_steps "back_steps": u32, 0..=u32::MAX;
     client_id "client_id": u64, 0..=sim_contract::CLIENT_ID_END - 1;
     start "start": u64, 0..=u64::MAX;
     stop "stop": u64, 0..=u64::MAX;
-    to_step "to_step": u64, 0..=u64::MAX;
 }

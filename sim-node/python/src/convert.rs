@@ -16,17 +16,6 @@ pub(crate) struct Numbers<const N: usize>(pub(crate) [f32; N]);
 
 /// Three coordinates.
 pub(crate) type Vector = Numbers<3>;
-/// A quaternion x, y, z, w.
-pub(crate) type Quaternion = Numbers<4>;
-
-impl Vector {
-    pub(crate) const ZERO: Self = Self([0.0; 3]);
-    pub(crate) const Z: Self = Self([0.0, 0.0, 1.0]);
-}
-
-impl Quaternion {
-    pub(crate) const IDENTITY: Self = Self([0.0, 0.0, 0.0, 1.0]);
-}
 
 impl<'py, const N: usize> FromPyObject<'_, 'py> for Numbers<N> {
     type Error = PyErr;

@@ -507,6 +507,15 @@ def test_actions_have_the_form_of_recordings() -> None:
     assert catenary.Action.from_dict(fields) == action != catenary.Action.pin(3)
 
 
+def test_every_kind_of_action_has_a_constructor() -> None:
+    # A restore belongs to a state, which `Node.restore` gives to the node.
+    missing = {kind for kind in catenary.Action.KINDS if not hasattr(catenary.Action, kind)}
+    assert missing == {"restore"}
+    assert catenary.Action("pin", particle=3) == catenary.Action.pin(3)
+    with pytest.raises(ValueError, match=r"did you mean 'particle'\?"):
+        catenary.Action("pin", partcle=3)
+
+
 def test_the_scene_of_a_recording_runs(simulate: Callable[..., Path]) -> None:
     path = simulate("pendulum", "--steps", "100")
     simulation = catenary.Simulation(str(path))

@@ -7,6 +7,7 @@ from typing import Any, Literal, Self, final
 import numpy as np
 import numpy.typing as npt
 
+from catenary._commands import ActionType
 from catenary._types import Floats, Vector, Wholes
 
 __all__ = [
@@ -294,79 +295,19 @@ class State:
     def __getnewargs__(self) -> tuple[int, bytes, bytes]: ...
 
 @final
-class Action:
-    """A command without its sender. The methods of `Commands` describe each of them."""
+class Action(metaclass=ActionType):
+    """A command without its sender: `Action("grab", particle=3, target=(0, 1, 0))`, with the fields of recordings.
 
+    The static methods have the names and arguments of the methods of `Commands`, which describe them.
+    """
+
+    KINDS: list[str]
+    """Names of the kinds of actions."""
+
+    def __new__(cls, kind: str, /, **fields: Any) -> Self: ...
     @staticmethod
-    def pin(particle: int) -> Action: ...
-    @staticmethod
-    def unpin(particle: int) -> Action: ...
-    @staticmethod
-    def grab(particle: int, target: Vector, over: float = ...) -> Action: ...
-    @staticmethod
-    def move(particle: int, target: Vector, over: float = ...) -> Action: ...
-    @staticmethod
-    def release(particle: int, *, force: bool = False) -> Action: ...
-    @staticmethod
-    def push(
-        center: Vector,
-        radius: float,
-        delta: Vector,
-        *,
-        limit: float | None = None,
-    ) -> Action: ...
-    @staticmethod
-    def cut(constraint: int) -> Action: ...
-    @staticmethod
-    def cut_radius(center: Vector, radius: float) -> Action: ...
-    @staticmethod
-    def cut_segment(
-        start: Vector, end: Vector, direction: Vector = ...
-    ) -> Action: ...
-    @staticmethod
-    def move_anchor(
-        anchor: int, translation: Vector, rotation: Vector = ..., over: float = ...
-    ) -> Action: ...
-    @staticmethod
-    def move_collider(
-        collider: int, translation: Vector, rotation: Vector = ..., over: float = ...
-    ) -> Action: ...
-    @staticmethod
-    def follow(
-        object: str, index: int, path: list[list[float]], append: bool = ...
-    ) -> list[Action]: ...
-    @staticmethod
-    def drive_body(
-        collider: int,
-        translation: Vector,
-        rotation: Vector = ...,
-        velocity: Vector = ...,
-        angular_velocity: Vector = ...,
-        force: Vector = ...,
-        torque: Vector = ...,
-    ) -> Action: ...
-    @staticmethod
-    def set(
-        parameter: str,
-        value: float | Vector | None,
-        kind: str | None = None,
-        block: int | None = None,
-        collider: int | None = None,
-    ) -> Action: ...
-    @staticmethod
-    def load(scene: str | PathLike[str]) -> Action: ...
-    @staticmethod
-    def pause() -> Action: ...
-    @staticmethod
-    def resume() -> Action: ...
-    @staticmethod
-    def step(count: int = 1) -> Action: ...
-    @staticmethod
-    def reset() -> Action: ...
-    @staticmethod
-    def rewind(*, to_step: int | None = None, back_steps: int | None = None) -> Action: ...
-    @staticmethod
-    def mark(text: str) -> Action: ...
+    def _follow(object: str, index: int, path: list[list[float]], append: bool) -> list[Action]:
+        """Returns the actions that lead an object along points, each a list of 4 or 8 numbers."""
     @staticmethod
     def from_dict(fields: dict[str, Any]) -> Action:
         """Returns the action of a dict such as `Outcome.command`, or of a row of `Recording.outcomes()`."""

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import ABC, ABCMeta, abstractmethod
 from collections.abc import Iterable, Mapping
-from typing import Any, Generic, Literal, TypeAlias, TypeVar, Union
+from os import PathLike
+from typing import TYPE_CHECKING, Any, Generic, Literal, TypeAlias, TypeVar, Union
 
 from catenary._catenary import Action
 from catenary._types import Vector
@@ -14,8 +15,8 @@ Value: TypeAlias = Union[float, Vector, Mapping[str, float], Mapping[int, float]
 """The value of a parameter: a number, three numbers, None for off, or numbers by kind, block or collider."""
 
 
-class Commands(ABC, Generic[Result]):
-    """The commands. Each of them takes effect before the next step."""
+class PlainCommands(ABC, Generic[Result]):
+    """The commands that are one action, with the arguments of the action."""
 
     @abstractmethod
     def _perform(self, action: Action) -> Result:
@@ -23,11 +24,11 @@ class Commands(ABC, Generic[Result]):
 
     def pin(self, particle: int) -> Result:
         """Holds a particle in place."""
-        return self._perform(Action.pin(particle))
+        return self._perform(Action("pin", particle=particle))
 
     def unpin(self, particle: int) -> Result:
         """Frees a pinned particle. It starts at rest."""
-        return self._perform(Action.unpin(particle))
+        return self._perform(Action("unpin", particle=particle))
 
     def grab(self, particle: int, target: Vector, over: float = 1 / 60) -> Result:
         """Grabs a particle and moves it along a straight line to `target`.
@@ -35,15 +36,15 @@ class Commands(ABC, Generic[Result]):
         `over` is the time to the target, from 0 to 3600 s. The particle follows only this client until
         `release`, or until the client ends.
         """
-        return self._perform(Action.grab(particle, target, over))
+        return self._perform(Action("grab", particle=particle, target=target, over_s=over))
 
     def move(self, particle: int, target: Vector, over: float = 1 / 60) -> Result:
         """Sets a new target for a particle that this client has grabbed. See `grab`."""
-        return self._perform(Action.move(particle, target, over))
+        return self._perform(Action("move", particle=particle, target=target, over_s=over))
 
     def release(self, particle: int, *, force: bool = False) -> Result:
         """Releases a grabbed particle with its velocity. `force` also ends the grab of another client."""
-        return self._perform(Action.release(particle, force=force))
+        return self._perform(Action("release", particle=particle, force=force))
 
     def push(
         self, center: Vector, radius: float, delta: Vector, *, limit: float | None = None
@@ -53,21 +54,22 @@ class Commands(ABC, Generic[Result]):
         In the next step, these particles move by `delta`, in metres. `limit` bounds the magnitude of each
         component of `delta`.
         """
-        return self._perform(Action.push(center, radius, delta, limit=limit))
+        return self._perform(Action("push", center=center, radius=radius, delta=delta, limit=limit))
 
     def cut(self, constraint: int) -> Result:
         """Tears a constraint."""
-        return self._perform(Action.cut(constraint))
+        return self._perform(Action("cut", constraint=constraint))
 
     def cut_radius(self, center: Vector, radius: float) -> Result:
         """Tears each constraint with an end within `radius` of `center`."""
-        return self._perform(Action.cut_radius(center, radius))
+        return self._perform(Action("cut_radius", center=center, radius=radius))
 
     def cut_segment(
         self, start: Vector, end: Vector, direction: Vector = (0.0, 0.0, 1.0)
     ) -> Result:
         """Tears each constraint that crosses the segment, extended to both sides along `direction`."""
-        return self._perform(Action.cut_segment(start, end, direction))
+        ends = {"from": start, "to": end}
+        return self._perform(Action("cut_segment", **ends, direction=direction))
 
     def move_anchor(
         self,
@@ -80,7 +82,8 @@ class Commands(ABC, Generic[Result]):
 
         `rotation` is a quaternion x, y, z, w. `over` is the time to the pose, up to 3600 s, and at least one step.
         """
-        return self._perform(Action.move_anchor(anchor, translation, rotation, over))
+        pose = {"translation": translation, "rotation": rotation}
+        return self._perform(Action("move_anchor", anchor=anchor, **pose, over_s=over))
 
     def move_collider(
         self,
@@ -94,30 +97,8 @@ class Commands(ABC, Generic[Result]):
         Particles in contact feel the velocity of the motion. `rotation` is a quaternion x, y, z, w. `over` is the time
         to the pose, up to 3600 s, and at least one step.
         """
-        return self._perform(Action.move_collider(collider, translation, rotation, over))
-
-    def follow(
-        self,
-        object: Literal["particle", "anchor", "collider"],
-        index: int,
-        path: Iterable[Iterable[float]],
-        *,
-        append: bool = False,
-    ) -> Result:
-        """Leads a particle that this client has grabbed, an anchor or a collider along points in time.
-
-        `path` is an array of shape (n, 4), with the time in s after this command, x, y and z in each row, or (n, 8)
-        with a quaternion x, y, z, w behind them. Points are as those of `grab` and `move_collider`. Times ascend, up to
-        3600 s. The object moves linearly from where it is, and stays at the last point. With `append`, the points
-        come after those of the motion under way, and their times count from its beginning. At most 2048 points of all
-        motions are on their way. Four points are a command, in the order given; the result is the outcome of the first
-        command.
-        """
-        rows = [[float(number) for number in row] for row in path]
-        return self._perform_all(Action.follow(object, index, rows, append))
-
-    def _perform_all(self, actions: list[Action]) -> Result:
-        return [self._perform(action) for action in actions][0]
+        pose = {"translation": translation, "rotation": rotation}
+        return self._perform(Action("move_collider", collider=collider, **pose, over_s=over))
 
     def drive_body(
         self,
@@ -138,10 +119,47 @@ class Commands(ABC, Generic[Result]):
         own body. In a step without this command the body stands.
         """
         return self._perform(
-            Action.drive_body(
-                collider, translation, rotation, velocity, angular_velocity, force, torque
+            Action(
+                "drive_body",
+                collider=collider,
+                translation=translation,
+                rotation=rotation,
+                velocity=velocity,
+                angular_velocity=angular_velocity,
+                force=force,
+                torque=torque,
             )
         )
+
+    def mark(self, text: str) -> Result:
+        """Marks the step in recordings. Changes nothing else."""
+        return self._perform(Action("mark", text=text))
+
+
+class Commands(PlainCommands[Result]):
+    """The commands. Each of them takes effect before the next step."""
+
+    def follow(
+        self,
+        object: Literal["particle", "anchor", "collider"],
+        index: int,
+        path: Iterable[Iterable[float]],
+        *,
+        append: bool = False,
+    ) -> Result:
+        """Leads a particle that this client has grabbed, an anchor or a collider along points in time.
+
+        `path` is an array of shape (n, 4), with the time in s after this command, x, y and z in each row, or (n, 8)
+        with a quaternion x, y, z, w behind them. Points are as those of `grab` and `move_collider`. Times ascend, up to
+        3600 s. The object moves linearly from where it is, and stays at the last point. With `append`, the points
+        come after those of the motion under way, and their times count from its beginning. At most 2048 points of all
+        motions are on their way. Four points are a command, in the order given; the result is the outcome of the first
+        command.
+        """
+        return self._perform_all(Action.follow(object, index, path, append))
+
+    def _perform_all(self, actions: list[Action]) -> Result:
+        return [self._perform(action) for action in actions][0]
 
     def set(self, values: Mapping[str, Value] | None = None, /, **named: Value) -> Result:
         """Sets parameters by name, such as `set(gravity=(0, 0, 0), damping=0.5)`. None turns one off.
@@ -159,9 +177,59 @@ class Commands(ABC, Generic[Result]):
             raise TypeError("give at least one parameter, such as set(damping=0.5)")
         return [self._perform(action) for action in actions][-1]
 
-    def mark(self, text: str) -> Result:
-        """Marks the step in recordings. Changes nothing else."""
-        return self._perform(Action.mark(text))
+
+class Constructors(PlainCommands[Action]):
+    """The static methods of `Action`: each returns the action of a command."""
+
+    def _perform(self, action: Action) -> Action:
+        return action
+
+    def follow(
+        self, object: str, index: int, path: Iterable[Iterable[float]], append: bool = False
+    ) -> list[Action]:
+        return Action._follow(object, index, [[float(one) for one in row] for row in path], append)
+
+    def set(
+        self,
+        parameter: str,
+        value: float | Vector | None,
+        kind: str | None = None,
+        block: int | None = None,
+        collider: int | None = None,
+    ) -> Action:
+        part = {"constraint_kind": kind, "block": block, "collider": collider}
+        return Action("set", parameter=parameter, value=value, **part)
+
+    def load(self, scene: str | PathLike[str]) -> Action:
+        return Action("load", scene=scene)
+
+    def pause(self) -> Action:
+        return Action("pause")
+
+    def resume(self) -> Action:
+        return Action("resume")
+
+    def step(self, count: int = 1) -> Action:
+        return Action("step", count=count)
+
+    def reset(self) -> Action:
+        return Action("reset")
+
+    def rewind(self, *, to_step: int | None = None, back_steps: int | None = None) -> Action:
+        if (to_step is None) == (back_steps is None):
+            raise ValueError("give either `to_step` or `back_steps`")
+        return Action("rewind", to_step=to_step, back_steps=back_steps)
+
+
+if TYPE_CHECKING:
+
+    class ActionType(ABCMeta, Constructors):
+        """The type of `Action`, for type checkers: the constructors are its methods."""
+
+
+for _name in dir(Constructors):
+    if not _name.startswith("_"):
+        setattr(Action, _name, staticmethod(getattr(Constructors(), _name)))
 
 
 # The part of the scene that an index in a dict names.

@@ -2,20 +2,25 @@
 
 use std::path::{Path, PathBuf};
 
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use serde::Serialize;
+use serde_json::{Map, Value};
 use sim_contract::{
-    ActionInfo, ConstraintKind, GRAB_OVER_S_DEFAULT, KindFilter, MovedObject, PathError, PathPoint,
-    Text, read_scene_file,
+    ACTIONS, ActionInfo, ConstraintKind, FieldForm, FieldInfo, KindFilter, MovedObject, PathError,
+    PathPoint, PlainF32, Text, read_scene_file,
 };
 use sim_solver::Scene;
 use sim_solver::scene::is_path;
 
-use crate::arguments;
-use crate::convert::{Quaternion, Vector, from_json, parameter_value};
+use crate::arguments::whole;
+use crate::convert::{Numbers, Vector, from_json, parameter_value};
 use crate::error::load_error;
 
-/// A command without its sender. The methods of `Commands` describe each of them.
+/// A command without its sender: `Action("grab", particle=3, target=(0, 1, 0))`, with the fields of recordings.
+///
+/// The static methods have the names and arguments of the methods of `Commands`, which describe them.
 #[pyclass(frozen, eq, module = "catenary")]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Action(pub(crate) sim_contract::Action);
@@ -47,94 +52,68 @@ fn constraint_kind(name: &str) -> PyResult<KindFilter> {
     })
 }
 
+/// Converts an argument to the JSON form of a field.
+fn field_value(field: &FieldInfo, value: &Bound<'_, PyAny>) -> PyResult<Value> {
+    match field.form {
+        FieldForm::Whole => json(whole::<u32>(value, field.name, &(0..=u32::MAX))?),
+        FieldForm::Long => json(whole::<u64>(value, field.name, &(0..=u64::MAX))?),
+        FieldForm::Number => json(PlainF32(value.extract()?)),
+        FieldForm::Flag => json(value.extract::<bool>()?),
+        FieldForm::Vector => json(value.extract::<Vector>()?.0.map(PlainF32)),
+        FieldForm::Rotation => json(value.extract::<Numbers<4>>()?.0.map(PlainF32)),
+        FieldForm::Value => json(parameter_value(value)?),
+        FieldForm::Kind => json(constraint_kind(value.extract()?)?),
+        FieldForm::Text if field.name == "scene" => json(scene_text(&value.extract::<PathBuf>()?)?),
+        FieldForm::Text => json(text(value.extract()?)?),
+        FieldForm::Object | FieldForm::Contents | FieldForm::Hash => {
+            json(value.extract::<String>()?)
+        }
+        FieldForm::Path => Err(PyTypeError::new_err("`Action.follow` makes the actions of a path")),
+    }
+}
+
+fn json(value: impl Serialize) -> PyResult<Value> {
+    serde_json::to_value(value).map_err(|error| PyValueError::new_err(error.to_string()))
+}
+
+/// Reads the JSON form of an action.
+fn from_fields(fields: Map<String, Value>) -> PyResult<Action> {
+    let kind = fields.get("kind").and_then(Value::as_str).unwrap_or_default();
+    let meant = ActionInfo::meant(kind, fields.keys().map(String::as_str));
+    serde_json::from_value(fields.into())
+        .map(Action)
+        .map_err(|error| PyValueError::new_err(format!("not an action: {error}{meant}")))
+}
+
 #[pymethods]
 impl Action {
-    #[staticmethod]
-    fn pin(#[pyo3(from_py_with = arguments::particle)] particle: u32) -> Self {
-        Self(sim_contract::Action::Pin { particle })
+    #[new]
+    #[pyo3(signature = (kind, /, **fields))]
+    fn new(kind: &str, fields: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let row = ActionInfo::from_name(kind);
+        let mut all = Map::from_iter([("kind".to_owned(), kind.into())]);
+        for (name, value) in fields.into_iter().flatten() {
+            let name: String = name.extract()?;
+            let field = row.and_then(|row| row.fields.iter().find(|field| field.name == name));
+            let is_given = field.is_none_or(|field| !field.is_optional || !value.is_none());
+            if is_given {
+                // An unknown name is refused with the nearest known one.
+                let value = field.map(|field| field_value(field, &value)).transpose()?;
+                all.insert(name, value.unwrap_or_default());
+            }
+        }
+        from_fields(all)
     }
 
-    #[staticmethod]
-    fn unpin(#[pyo3(from_py_with = arguments::particle)] particle: u32) -> Self {
-        Self(sim_contract::Action::Unpin { particle })
-    }
-
-    #[staticmethod]
-    #[pyo3(signature = (particle, target, over=GRAB_OVER_S_DEFAULT))]
-    fn grab(
-        #[pyo3(from_py_with = arguments::particle)] particle: u32,
-        target: Vector,
-        over: f32,
-    ) -> Self {
-        Self(sim_contract::Action::Grab { particle, target: target.0, over_s: over })
-    }
-
-    #[staticmethod]
-    #[pyo3(name = "move", signature = (particle, target, over=GRAB_OVER_S_DEFAULT))]
-    fn move_grabbed(
-        #[pyo3(from_py_with = arguments::particle)] particle: u32,
-        target: Vector,
-        over: f32,
-    ) -> Self {
-        Self(sim_contract::Action::Move { particle, target: target.0, over_s: over })
-    }
-
-    #[staticmethod]
-    #[pyo3(signature = (particle, *, force=false))]
-    fn release(#[pyo3(from_py_with = arguments::particle)] particle: u32, force: bool) -> Self {
-        Self(sim_contract::Action::Release { particle, force })
-    }
-
-    #[staticmethod]
-    #[pyo3(signature = (center, radius, delta, *, limit=None))]
-    fn push(center: Vector, radius: f32, delta: Vector, limit: Option<f32>) -> Self {
-        Self(sim_contract::Action::Push { center: center.0, radius, delta: delta.0, limit })
-    }
-
-    #[staticmethod]
-    fn cut(#[pyo3(from_py_with = arguments::constraint)] constraint: u32) -> Self {
-        Self(sim_contract::Action::Cut { constraint })
-    }
-
-    #[staticmethod]
-    fn cut_radius(center: Vector, radius: f32) -> Self {
-        Self(sim_contract::Action::CutRadius { center: center.0, radius })
-    }
-
-    #[staticmethod]
-    #[pyo3(signature = (start, end, direction=Vector::Z))]
-    fn cut_segment(start: Vector, end: Vector, direction: Vector) -> Self {
-        let (from, to, direction) = (start.0, end.0, direction.0);
-        Self(sim_contract::Action::CutSegment { from, to, direction })
-    }
-
-    #[staticmethod]
-    #[pyo3(signature = (anchor, translation, rotation=Quaternion::IDENTITY, over=0.0))]
-    fn move_anchor(
-        #[pyo3(from_py_with = arguments::anchor)] anchor: u32,
-        translation: Vector,
-        rotation: Quaternion,
-        over: f32,
-    ) -> Self {
-        let (translation, rotation) = (translation.0, rotation.0);
-        Self(sim_contract::Action::MoveAnchor { anchor, translation, rotation, over_s: over })
-    }
-
-    #[staticmethod]
-    #[pyo3(signature = (collider, translation, rotation=Quaternion::IDENTITY, over=0.0))]
-    fn move_collider(
-        #[pyo3(from_py_with = arguments::collider)] collider: u32,
-        translation: Vector,
-        rotation: Quaternion,
-        over: f32,
-    ) -> Self {
-        let (translation, rotation) = (translation.0, rotation.0);
-        Self(sim_contract::Action::MoveCollider { collider, translation, rotation, over_s: over })
+    #[classattr]
+    #[pyo3(name = "KINDS")]
+    fn kinds() -> Vec<&'static str> {
+        ACTIONS.iter().map(|info| info.name).collect()
     }
 
     /// Returns the actions that lead an object along points, each a list of 4 or 8 numbers.
     #[staticmethod]
-    #[pyo3(signature = (object, index, path, append=false))]
+    #[pyo3(name = "_follow")]
     fn follow(object: &str, index: u32, path: Vec<Vec<f64>>, append: bool) -> PyResult<Vec<Self>> {
         let object = MovedObject::from_name(object).ok_or_else(|| {
             let allowed = MovedObject::ALL.map(MovedObject::name).join(", ");
@@ -150,99 +129,6 @@ impl Action {
         Ok(actions.into_iter().map(Self).collect())
     }
 
-    #[staticmethod]
-    #[pyo3(signature = (
-        collider,
-        translation,
-        rotation=Quaternion::IDENTITY,
-        velocity=Vector::ZERO,
-        angular_velocity=Vector::ZERO,
-        force=Vector::ZERO,
-        torque=Vector::ZERO,
-    ))]
-    #[allow(clippy::too_many_arguments, reason = "these are the keywords of Python")]
-    fn drive_body(
-        #[pyo3(from_py_with = arguments::collider)] collider: u32,
-        translation: Vector,
-        rotation: Quaternion,
-        velocity: Vector,
-        angular_velocity: Vector,
-        force: Vector,
-        torque: Vector,
-    ) -> Self {
-        Self(sim_contract::Action::DriveBody {
-            collider,
-            translation: translation.0,
-            rotation: rotation.0,
-            velocity: velocity.0,
-            angular_velocity: angular_velocity.0,
-            force: force.0,
-            torque: torque.0,
-        })
-    }
-
-    #[staticmethod]
-    #[pyo3(signature = (parameter, value, kind=None, block=None, collider=None))]
-    fn set(
-        parameter: &str,
-        value: &Bound<'_, PyAny>,
-        kind: Option<&str>,
-        block: Option<u32>,
-        collider: Option<u32>,
-    ) -> PyResult<Self> {
-        Ok(Self(sim_contract::Action::Set {
-            parameter: text(parameter)?,
-            value: parameter_value(value)?,
-            constraint_kind: kind.map(constraint_kind).transpose()?,
-            block,
-            collider,
-        }))
-    }
-
-    #[staticmethod]
-    fn load(scene: PathBuf) -> PyResult<Self> {
-        Ok(Self(sim_contract::Action::Load { scene: scene_text(&scene)? }))
-    }
-
-    #[staticmethod]
-    fn pause() -> Self {
-        Self(sim_contract::Action::Pause)
-    }
-
-    #[staticmethod]
-    fn resume() -> Self {
-        Self(sim_contract::Action::Resume)
-    }
-
-    #[staticmethod]
-    #[pyo3(signature = (count=1))]
-    fn step(#[pyo3(from_py_with = arguments::node_steps)] count: u32) -> Self {
-        Self(sim_contract::Action::Step { count })
-    }
-
-    #[staticmethod]
-    fn reset() -> Self {
-        Self(sim_contract::Action::Reset)
-    }
-
-    #[staticmethod]
-    #[pyo3(signature = (*, to_step=None, back_steps=None))]
-    fn rewind(
-        #[pyo3(from_py_with = arguments::to_step)] to_step: Option<u64>,
-        #[pyo3(from_py_with = arguments::back_steps)] back_steps: Option<u32>,
-    ) -> PyResult<Self> {
-        if to_step.is_some() == back_steps.is_some() {
-            return Err(PyValueError::new_err("give either `to_step` or `back_steps`"));
-        }
-        Ok(Self(sim_contract::Action::Rewind { to_step, back_steps }))
-    }
-
-    #[staticmethod]
-    #[pyo3(name = "mark")]
-    fn mark_step(text: &str) -> PyResult<Self> {
-        Ok(Self(sim_contract::Action::Mark { text: self::text(text)? }))
-    }
-
     /// Returns the action as recordings store it.
     #[allow(clippy::wrong_self_convention, reason = "Python passes a reference")]
     fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
@@ -253,19 +139,10 @@ impl Action {
     #[staticmethod]
     fn from_dict(fields: &Bound<'_, PyAny>) -> PyResult<Self> {
         let json = fields.py().import("json")?.call_method1("dumps", (fields,))?;
-        let mut fields: serde_json::Value = serde_json::from_str(json.extract()?)
+        let mut fields: Map<String, Value> = serde_json::from_str(json.extract()?)
             .map_err(|error| PyValueError::new_err(error.to_string()))?;
-        if let Some(fields) = fields.as_object_mut() {
-            fields.retain(|name, _| !ENVELOPE.contains(&name.as_str()));
-        }
-        let meant = fields.as_object().map_or_else(String::new, |fields| {
-            let kind = fields.get("kind").and_then(serde_json::Value::as_str).unwrap_or_default();
-            ActionInfo::meant(kind, fields.keys().map(String::as_str))
-        });
-        let action = serde_json::from_value(fields);
-        action
-            .map(Self)
-            .map_err(|error| PyValueError::new_err(format!("not an action: {error}{meant}")))
+        fields.retain(|name, _| !ENVELOPE.contains(&name.as_str()));
+        from_fields(fields)
     }
 
     fn __repr__(&self) -> String {
