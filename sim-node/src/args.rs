@@ -3,10 +3,7 @@
 mod bench;
 mod command;
 mod ctl;
-mod domain;
 mod endpoint;
-mod lesson;
-mod real_time;
 mod run;
 mod scene;
 mod value;
@@ -21,12 +18,13 @@ use sim_contract::console;
 use sim_solver::builtin;
 use sim_solver::scene::is_path;
 
+use crate::lesson::LessonArgs;
+
 pub(crate) use bench::{BenchArgs, BenchClientArgs, ClientRole};
 pub(crate) use command::CommandVerb;
 pub(crate) use ctl::{CtlArgs, CtlVerb, QueryVerb, WatchArgs};
-pub(crate) use domain::{DoctorArgs, PsArgs};
 use endpoint::EndpointArgs;
-pub(crate) use lesson::LessonArgs;
+pub(crate) use endpoint::{DoctorArgs, PsArgs};
 pub(crate) use run::RunArgs;
 pub(crate) use scene::{CheckArgs, ImportArgs, ScenesArgs, ShowArgs};
 

@@ -6,7 +6,6 @@
 
 mod children;
 pub(crate) mod client;
-mod machine;
 mod measurement;
 mod report;
 mod table;
@@ -20,8 +19,8 @@ use sim_contract::{ScratchDomain, Stop, report_bus_errors};
 use crate::args::{BenchArgs, ClientRole};
 use crate::node::{Phase, PhaseTimes, RealTime};
 use crate::{output, scene_source};
-use machine::Machine;
 use measurement::{Bench, Mode, NodeRun};
+use report::Machine;
 use report::{Build, CommandRow, LatencyRow, LockstepRow, LoopRow, PhaseRow, Report, Wait};
 use times::{Percentiles, Samples};
 

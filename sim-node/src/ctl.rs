@@ -2,12 +2,10 @@
 
 mod action;
 mod command;
-mod energy;
+mod explanation;
 mod forces;
-mod hint;
 mod parameters;
 mod particles;
-mod rejection;
 pub(crate) mod status;
 mod watch;
 
@@ -15,7 +13,7 @@ use anyhow::Context;
 use sim_contract::{CONSOLE_CLIENT_ID, Client, report_bus_errors};
 
 use crate::args::{CtlArgs, CtlVerb, QueryVerb};
-use crate::exit::Exit;
+use crate::output::Exit;
 
 /// Sends one command, or answers one query.
 pub(crate) fn ctl(args: &CtlArgs) -> anyhow::Result<Exit> {

@@ -7,8 +7,8 @@ use sim_solver::builtin;
 use sim_solver::scene::SceneCounts;
 
 use crate::args::{CheckArgs, ScenesArgs, ShowArgs};
-use crate::exit::Exit;
-use crate::table::{Align, Table};
+use crate::output::Exit;
+use crate::output::{Align, Table};
 use crate::{output, scene_source};
 
 /// One built-in scene in the list.

@@ -7,7 +7,7 @@ use sim_contract::READERS_MAX;
 use sim_solver::scene::RATE_HZ_MAX;
 
 use super::endpoint::EndpointArgs;
-use super::real_time::RealTimeArgs;
+use super::run::RealTimeArgs;
 use super::value::{time, whole};
 
 #[derive(Debug, ClapArgs)]

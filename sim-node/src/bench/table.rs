@@ -1,9 +1,9 @@
 //! The report as text for people.
 
-use super::machine::Machine;
+use super::report::Machine;
 use super::report::{LatencyRow, LoopRow, PhaseRow, Report, Wait};
 use super::times::Percentiles;
-use crate::table::{Align, Table};
+use crate::output::{Align, Table};
 
 /// Header of the columns of [`cells`].
 const TIMES: [(&str, Align); 4] =

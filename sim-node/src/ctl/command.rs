@@ -7,10 +7,10 @@ use serde::Serialize;
 use sim_contract::clock::monotonic_ns;
 use sim_contract::{Action, COMMANDS_BUFFERED, Client, Outcome};
 
-use super::{hint, rejection};
+use super::explanation;
 use crate::args::CtlArgs;
-use crate::exit::Exit;
 use crate::output;
+use crate::output::Exit;
 
 /// An outcome in JSON: the command with its result.
 #[derive(Serialize)]
@@ -69,14 +69,14 @@ pub(super) fn send(
         };
         output::line(&format!("applied at step {step}{what}"))?;
     } else {
-        let explanation = rejection::explain(client, args.timeout(), &outcome)
+        let explanation = explanation::explain(client, args.timeout(), &outcome)
             .map_or_else(String::new, |explanation| format!(": {explanation}"));
         output::line(&format!("rejected at step {step}: {reason}{explanation}"))?;
     }
     if !outcome.is_applied() {
         return Ok(Exit::Rejected);
     }
-    if let Some(hint) = hint::for_applied(client, args.timeout(), &row.action) {
+    if let Some(hint) = explanation::hint(client, args.timeout(), &row.action) {
         output::note(&format!("hint: {hint}"));
     }
     Ok(Exit::Done)

@@ -9,7 +9,7 @@ use sim_contract::{
 
 use crate::args::CtlArgs;
 use crate::output;
-use crate::table::{Align, Table};
+use crate::output::{Align, Table};
 
 /// The forces of a step in JSON.
 #[derive(Debug, Serialize)]

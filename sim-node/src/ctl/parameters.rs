@@ -8,7 +8,7 @@ use sim_contract::{
 
 use crate::args::CtlArgs;
 use crate::output;
-use crate::table::{Align, Table};
+use crate::output::{Align, Table};
 
 /// Key of the bending of blocks in JSON.
 const BY_BLOCK: &str = "bending_by_block";

@@ -6,7 +6,7 @@ use sim_contract::{Client, ParticleFlags, ParticleState, Snapshot};
 
 use crate::args::CtlArgs;
 use crate::output;
-use crate::table::{Align, Table};
+use crate::output::{Align, Table};
 
 /// A particle in JSON.
 #[derive(Serialize)]

@@ -9,7 +9,7 @@ use sim_solver::Applied;
 
 use super::inbox::Request;
 use super::job::Done;
-use super::job::scene::{Loaded, Refusal};
+use super::job::{Loaded, Refusal};
 use super::pace::Pace;
 use super::publisher::StepTimes;
 use super::publisher::run::Run;

@@ -2,9 +2,8 @@
 //!
 //! The node makes a late step at once and catches up with the following ones, without a longer dt.
 //! A node more than [`CATCH_UP_NS_MAX`] behind gives up whole periods and counts them, so that a
-//! stall (a suspended process) does not end in a burst of steps.
-
-pub(crate) mod polling;
+//! stall (a suspended process) does not end in a burst of steps. A loop with real-time scheduling rests, and a node that makes
+//! no step looks for commands in between.
 
 use sim_contract::clock::SECOND_NS;
 
@@ -119,9 +118,78 @@ impl Pace {
     }
 }
 
+/// Interval while clients send commands: a client that waits for an outcome sends the next one at once.
+const BUSY_INTERVAL_NS: u64 = SECOND_NS / 50_000;
+/// Time after the last command for which clients count as sending. It bounds the load of a node that
+/// waits to a few milliseconds per command.
+const BUSY_NS: u64 = SECOND_NS / 200;
+
+/// Times of the looks for commands of a node that makes no step for now.
+#[derive(Debug, Default)]
+pub(crate) struct Polling {
+    /// CLOCK_MONOTONIC at which clients no longer count as sending.
+    busy_until_ns: u64,
+}
+
+impl Polling {
+    /// Notes that commands have arrived.
+    pub(crate) fn on_commands(&mut self, now_ns: u64) {
+        self.busy_until_ns = now_ns + BUSY_NS;
+    }
+
+    /// Returns the time of the next look, at most `interval_ns` from now.
+    pub(crate) fn next_ns(&self, now_ns: u64, interval_ns: u64) -> u64 {
+        let is_busy = now_ns < self.busy_until_ns;
+        now_ns + if is_busy { BUSY_INTERVAL_NS.min(interval_ns) } else { interval_ns }
+    }
+}
+
+/// Time from one look at the processor time to the next.
+const WINDOW_NS: u64 = SECOND_NS / 10;
+/// Share of each window that the loop rests at least: one part in this number.
+const REST_DIVISOR: u64 = 20;
+
+/// Rests of a loop with real-time scheduling. A loop that cannot keep its pace has no time to sleep. With SCHED_FIFO, no
+/// ordinary thread would then run on its core, and a machine with one core would freeze.
+///
+/// Holds the start of the current window; `None` before the first wait.
+#[derive(Debug, Default)]
+pub(crate) struct Rest(Option<Window>);
+
+#[derive(Debug, Clone, Copy)]
+struct Window {
+    start_ns: u64,
+    /// Processor time of the loop's thread at the start.
+    busy_ns: u64,
+}
+
+impl Rest {
+    /// Returns the end of a wait for a deadline: the deadline, or later if the loop has not rested.
+    /// `busy_ns` reads the processor time of the loop's thread.
+    pub(crate) fn end_ns(
+        &mut self,
+        now_ns: u64,
+        deadline_ns: u64,
+        busy_ns: impl Fn() -> u64,
+    ) -> u64 {
+        let window = self.0.get_or_insert_with(|| Window { start_ns: now_ns, busy_ns: busy_ns() });
+        let elapsed_ns = now_ns - window.start_ns;
+        if elapsed_ns < WINDOW_NS {
+            return deadline_ns;
+        }
+        let total_ns = busy_ns();
+        // The busy time is 19 of 20 parts of a window that is long enough.
+        let needed_ns = (total_ns - window.busy_ns) / (REST_DIVISOR - 1) * REST_DIVISOR;
+        let end_ns = deadline_ns.max(now_ns + needed_ns.saturating_sub(elapsed_ns));
+        *window = Window { start_ns: end_ns.max(now_ns), busy_ns: total_ns };
+        end_ns
+    }
+}
+
 #[cfg(test)]
 mod tests {
     //! Compares deadlines with exact fractions of a second.
+    //! Runs loops of a given load on a clock of their own.
     use super::*;
 
     #[test]
@@ -194,5 +262,47 @@ mod tests {
         let mut pace = Pace::new(1, 0);
         pace.meet(3 * SECOND_NS);
         assert_eq!((pace.skipped_periods, pace.deadline_ns()), (0, 2 * SECOND_NS));
+    }
+
+    #[test]
+    fn a_command_shortens_the_interval_for_five_milliseconds() {
+        let mut polling = Polling::default();
+        assert_eq!(polling.next_ns(7, 2_000_000), 2_000_007);
+        polling.on_commands(1000);
+        assert_eq!(polling.next_ns(2000, 2_000_000), 22_000);
+        assert_eq!(polling.next_ns(2000, 5), 2005);
+        assert_eq!(polling.next_ns(5_000_999, 2_000_000), 5_020_999);
+        assert_eq!(polling.next_ns(5_001_000, 2_000_000), 7_001_000);
+    }
+
+    /// Share of the time that a loop with steps of `step_ns` at a period of `period_ns` sleeps. It first
+    /// sleeps for a minute without a deadline, as a paused node does.
+    fn slept_share(step_ns: u64, period_ns: u64) -> f64 {
+        let mut rest = Rest::default();
+        rest.end_ns(0, 0, || 0);
+        let start_ns = 60 * SECOND_NS;
+        let (mut now_ns, mut deadline_ns, mut busy_ns) = (start_ns, start_ns, 0);
+        while now_ns < start_ns + 10 * SECOND_NS {
+            deadline_ns += period_ns;
+            now_ns = rest.end_ns(now_ns, deadline_ns, || busy_ns).max(now_ns) + step_ns;
+            busy_ns += step_ns;
+        }
+        1.0 - busy_ns as f64 / (now_ns - start_ns) as f64
+    }
+
+    #[test]
+    fn an_overloaded_loop_rests_for_a_twentieth_of_the_time() {
+        for (step_ns, period_ns) in [(1_000_000, 1_000_000), (900, 10), (300_000_000, 1_000_000)] {
+            let share = slept_share(step_ns, period_ns);
+            assert!((0.04..0.06).contains(&share), "{step_ns} of {period_ns}: {share}");
+        }
+    }
+
+    #[test]
+    fn a_loop_that_keeps_its_pace_gets_no_further_rest() {
+        for (step_ns, share) in [(900_000, 0.1), (100_000, 0.9)] {
+            let slept = slept_share(step_ns, 1_000_000);
+            assert!((slept - share).abs() < 1e-3, "{slept} instead of {share}");
+        }
     }
 }

@@ -19,7 +19,7 @@ use sim_contract::{
 use sim_solver::{Applied, SOLVER_VERSION, Scene, Solver};
 
 use super::inbox::Given;
-use super::statistics::phases::{Phase, Phases};
+use super::statistics::{Phase, Phases};
 use forces::ForcesPublisher;
 pub(super) use load::LoadMessages;
 pub(crate) use load::shared_memory_bytes;

@@ -4,9 +4,9 @@
 use sim_solver::{Solver, THREADS_MAX};
 
 use super::Node;
-use super::real_time::cpus::Cpus;
-use super::real_time::preparation::{Prepared, prepare};
-use super::real_time::rest::Rest;
+use super::pace::Rest;
+use super::real_time::Cpus;
+use super::real_time::{Prepared, prepare};
 
 /// Number of particles from which on the default is more than one thread. In smaller scenes, the solver divides only
 /// the contacts.

@@ -3,9 +3,7 @@
 use sim_contract::{Action, COMMANDS_PER_STEP_MAX, Stop, Text};
 use sim_solver::{Keyframe, Plan};
 
-use super::scene::load;
-use super::work::Work;
-use super::{Done, Job};
+use super::{Done, Job, Work, load};
 use crate::node::Node;
 use crate::node::history::Target;
 use crate::node::inbox::Request;

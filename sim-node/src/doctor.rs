@@ -6,7 +6,6 @@ mod finding;
 mod leftovers;
 mod limits;
 mod permissions;
-mod user;
 
 use std::fs;
 use std::path::Path;
@@ -16,14 +15,13 @@ use sim_contract::{ConfigFile, Domain, Endpoint};
 use sim_solver::Solver;
 
 use crate::args::DoctorArgs;
-use crate::exit::Exit;
 use crate::node::shared_memory_bytes;
-use crate::table::{Align, Table};
+use crate::output::Exit;
+use crate::output::{Align, Table};
 use crate::{output, scene_source};
-use config_files::Place;
+use config_files::{Place, User};
 use finding::{Finding, Level};
 use limits::Capability;
-use user::User;
 
 /// Result of all checks in JSON.
 #[derive(Serialize)]

@@ -8,7 +8,7 @@ use sim_contract::{Domain, ListedNode, NodeAnswer, NodeStatus};
 use crate::args::PsArgs;
 use crate::ctl::status::{MemberRow, StatusRow};
 use crate::output;
-use crate::table::{Align, Table};
+use crate::output::{Align, Table};
 
 /// A node in JSON. A node that does not answer has none of the fields of its status.
 #[derive(Serialize)]
