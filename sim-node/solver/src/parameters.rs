@@ -12,6 +12,7 @@ use crate::checks::Context;
 use crate::constraints::bends::Bend;
 use crate::scene::definition::Scene;
 use crate::scene::definition::element::Limits;
+use crate::scene::definition::settings::parameter_values;
 use surfaces::Surfaces;
 
 /// Values that can change while a scene runs. Part of the state, and of a keyframe.
@@ -99,27 +100,7 @@ pub(crate) fn part_of_command(
 impl Scene {
     /// Returns the parameters of the scene. Its colliders have values of their own.
     pub fn parameter_values(&self) -> ParameterValues {
-        let (solver, Limits { max_stretch, tear_stretch, tear_distance, tear_force }) =
-            (&self.solver, self.solver.limits);
-        let values = ParameterValues::default()
-            .with(Parameter::Gravity, self.gravity)
-            .with(Parameter::Damping, solver.damping)
-            .with(Parameter::Substeps, solver.substeps as f32)
-            .with(Parameter::Iterations, solver.iterations as f32)
-            .with(Parameter::Relaxation, solver.relaxation)
-            .with(Parameter::MaxStretch, max_stretch)
-            .with(Parameter::TearStretch, tear_stretch)
-            .with(Parameter::TearDistance, tear_distance)
-            .with(Parameter::TearForce, tear_force)
-            .with(Parameter::MaxSpeed, solver.max_speed)
-            .with(Parameter::ContactThickness, self.contact.distance())
-            .with(Parameter::ContactFriction, self.contact.friction);
-        match self.wind {
-            Some(wind) => values
-                .with(Parameter::WindVelocity, wind.velocity)
-                .with(Parameter::WindDrag, wind.drag),
-            None => values,
-        }
+        parameter_values(self.gravity, &self.solver, &self.contact, self.wind.as_ref())
     }
 }
 

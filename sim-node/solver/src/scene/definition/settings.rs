@@ -138,6 +138,35 @@ impl SceneTable for SolverSettings {
     }
 }
 
+/// The values of the settings that are parameters.
+pub(crate) fn parameter_values(
+    gravity: [f32; 3],
+    solver: &SolverSettings,
+    contact: &ContactSettings,
+    wind: Option<&Wind>,
+) -> ParameterValues {
+    let Limits { max_stretch, tear_stretch, tear_distance, tear_force } = solver.limits;
+    let values = ParameterValues::default()
+        .with(Parameter::Gravity, gravity)
+        .with(Parameter::Damping, solver.damping)
+        .with(Parameter::Substeps, solver.substeps as f32)
+        .with(Parameter::Iterations, solver.iterations as f32)
+        .with(Parameter::Relaxation, solver.relaxation)
+        .with(Parameter::MaxStretch, max_stretch)
+        .with(Parameter::TearStretch, tear_stretch)
+        .with(Parameter::TearDistance, tear_distance)
+        .with(Parameter::TearForce, tear_force)
+        .with(Parameter::MaxSpeed, solver.max_speed)
+        .with(Parameter::ContactThickness, contact.distance())
+        .with(Parameter::ContactFriction, contact.friction);
+    match wind {
+        Some(wind) => {
+            values.with(Parameter::WindVelocity, wind.velocity).with(Parameter::WindDrag, wind.drag)
+        }
+        None => values,
+    }
+}
+
 /// Reads the tethers of each particle: whether it has some, or their number.
 fn read_tethers(at: At<'_>) -> Option<u32> {
     match at.text() {
