@@ -1,7 +1,7 @@
 //! The client API for C and C++: `libcatenary` and its header, `include/catenary.h`.
 //!
 //! Each function of the header is a thin call of [`sim_contract::Client`]. The comments of this crate's
-//! functions and types are those of the header, so they speak to C programs; a test generates the header
+//! functions and types are the comments of the header, so they speak to C programs; a test generates the header
 //! and compares it.
 //!
 //! - No panic crosses the boundary: [`outcome::guard`] turns it into a result.

@@ -159,13 +159,13 @@ impl Solver {
         self.locate_forces();
     }
 
-    /// Marks the tethers as out of date if a particle starts or stops being a root: a grabbed
-    /// particle is none.
+    /// Marks the tethers as out of date if a particle starts or stops being a root. Grabbed
+    /// particles are excluded.
     fn update_root(&mut self, index: usize) {
         self.due.tethers |= self.has_flag(index, ParticleFlags::PINNED | ParticleFlags::ANCHORED);
     }
 
-    /// Sets the velocity of every free particle strictly inside a sphere to that of a brush.
+    /// Sets the velocity of every free particle strictly inside a sphere to the velocity of a brush.
     ///
     /// # Errors
     /// A number is not finite or out of range.

@@ -18,7 +18,7 @@ use surfaces::Surfaces;
 /// Values that can change while a scene runs. Part of the state, and of a keyframe.
 #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Parameters {
-    /// All values except those of colliders. The pace belongs to the node: the time scale is 1.
+    /// All values except the values of colliders. The pace belongs to the node: the time scale is 1.
     #[serde(with = "settings")]
     pub(crate) values: ParameterValues,
     /// The surface of each collider.

@@ -30,7 +30,7 @@ pub(crate) struct CommandVerb {
     pub(crate) time: Option<Duration>,
 }
 
-/// Words in the help of a command, beside those of the table of actions.
+/// Details and examples in the help of a command. Its other words come from the table of actions.
 struct Words {
     kind: &'static str,
     details: &'static str,

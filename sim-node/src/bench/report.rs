@@ -40,7 +40,7 @@ pub(super) enum Build {
 pub(super) struct LoopRow {
     pub(super) reader_count: usize,
     pub(super) wake_late: Percentiles,
-    /// Percentiles of the lateness, divided by those of the bare loop.
+    /// Percentiles of the lateness, divided by the percentiles of the bare loop.
     pub(super) wake_late_ratio_p50: Option<f64>,
     pub(super) wake_late_ratio_p99: Option<f64>,
     pub(super) late_step_count: u64,

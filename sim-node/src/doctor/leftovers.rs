@@ -71,7 +71,7 @@ fn process_id(leftover: &Leftover) -> Option<u32> {
     }
 }
 
-/// Size of the segments of unknown processes; those of known ones are not listed.
+/// Size of the segments of unknown processes; the segments of known processes are not listed.
 fn size(leftovers: &[&Leftover]) -> String {
     match leftovers.iter().map(|one| one.size_bytes).sum::<u64>() {
         bytes if bytes < 1 << 20 => String::new(),

@@ -7,7 +7,7 @@ const OPEN_FILES_FULL: u64 = 512;
 /// Open files of a node with a viewer and a recorder.
 const OPEN_FILES_FEW: u64 = 128;
 
-/// Highest priority that the limit has to allow, far below those of the kernel's own threads.
+/// Highest priority that the limit has to allow, far below the priorities of the kernel's own threads.
 const PRIORITY: u64 = 1;
 
 /// A limit of the system; `None` is no limit.

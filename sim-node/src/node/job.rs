@@ -35,14 +35,14 @@ pub(super) enum Done {
     Nothing,
 }
 
-/// Settings of the node that replace those of each scene.
+/// Settings of the node that replace the settings of each scene.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Overrides {
     pub(crate) rate_hz: Option<u32>,
     pub(crate) substeps: Option<u32>,
 }
 
-/// Why a scene cannot be loaded.
+/// Refusal of a scene.
 #[derive(Debug)]
 pub(super) struct Refusal {
     /// For the people who read the node's warnings.
@@ -57,7 +57,7 @@ pub(super) struct Loaded {
     pub(super) scene: Scene,
     pub(super) solver: Solver,
     pub(super) messages: LoadMessages,
-    /// Its rate is not that of the run.
+    /// The scene and the run have different rates.
     pub(super) begins_run: bool,
 }
 

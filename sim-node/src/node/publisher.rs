@@ -66,7 +66,7 @@ pub(crate) struct Publisher {
     times: StepTimes,
     /// Header of the newest published snapshot.
     last: SnapshotHeader,
-    /// Number of outcomes after which the state is still that of this snapshot.
+    /// Number of outcomes after which the state still equals this snapshot.
     same_state_count: u64,
     /// Number of published snapshots, modulo 2^32.
     snapshot_count: u32,
@@ -169,12 +169,12 @@ impl Publisher {
         self.in_place_step = step;
     }
 
-    /// Returns `true` for the newest step whose state a command has put in place; step 0 of a run is none.
+    /// Returns `true` for the newest step whose state a command has put in place. Step 0 of a run is excluded.
     pub(crate) fn is_in_place(&self, step: u64) -> bool {
         step > 0 && step == self.in_place_step
     }
 
-    /// Returns `true` if the newest published snapshot is that of a step, and says that a command has put its state in place.
+    /// Returns `true` if the newest published snapshot belongs to a step, and says that a command has put its state in place.
     pub(crate) fn has_published_in_place(&self, step: u64) -> bool {
         self.has_published(step) && self.last.flags & SnapshotFlags::IN_PLACE != 0
     }
@@ -199,7 +199,7 @@ impl Publisher {
         self.owner.living_members()
     }
 
-    /// Returns `true` if the newest published snapshot is that of a step.
+    /// Returns `true` if the newest published snapshot belongs to a step.
     pub(crate) fn has_published(&self, step: u64) -> bool {
         self.last.step == step
     }
@@ -354,7 +354,7 @@ impl Publisher {
         Ok(())
     }
 
-    /// Publishes the parameters if they differ from the ones published last. `step` is the first
+    /// Publishes the parameters if they differ from the parameters published last. `step` is the first
     /// step that they apply to.
     pub(crate) fn publish_parameters(
         &mut self,
@@ -372,7 +372,7 @@ impl Publisher {
 
     /// Publishes outcomes while the node waits, and a keyframe of the last snapshot for a reader that
     /// has joined since. A command that has changed the waiting state makes that keyframe
-    /// impossible; the reader then receives the one of the next snapshot.
+    /// impossible; the reader then receives the keyframe of the next snapshot.
     ///
     /// A keyframe that exists is latched, so it is published again before outcomes that it does not count: a reader that
     /// joins later receives none of them.

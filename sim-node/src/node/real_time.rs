@@ -1,6 +1,6 @@
 //! Real-time scheduling of the loop and of the solver's threads, a CPU for the loop, and locked memory.
 //!
-//! A run without them works, only with more lateness. So each one that the system refuses is reported
+//! A run without them works, only with more lateness. So each property that the system refuses is reported
 //! with its cure, and is an error only if the options require it.
 
 use std::num::NonZero;
@@ -134,7 +134,7 @@ fn describe(error: &Error) -> String {
     }
 }
 
-/// The CPUs of this process, and the one of the loop.
+/// The CPUs of this process, and the CPU of the loop.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Cpus {
     /// `None` if the system does not tell.
@@ -176,7 +176,7 @@ impl Cpus {
         ranges.map(range).collect::<Vec<_>>().join(", ")
     }
 
-    /// Makes the calling thread, which is that of the loop, run on one CPU.
+    /// Makes the calling thread, which runs the loop, run on one CPU.
     fn pin(&mut self, cpu: usize) -> Result<(), Refused> {
         let mut set = CpuSet::new();
         set.set(cpu);
@@ -212,7 +212,7 @@ impl Cpus {
 /// slow readers.
 fn lock_memory() -> Result<(), Refused> {
     let refused = |reason| Refused { property: "locked memory", reason, cure: memory_cure() };
-    // Under a limit, later allocations would fail, such as that of a load.
+    // Under a limit, later allocations would fail, such as the memory of a load.
     if let Some(limit_bytes) = limit_bytes() {
         let text = format!("this process may lock {} KiB only", limit_bytes >> 10);
         return Err(refused(text));

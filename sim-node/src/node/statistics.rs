@@ -158,7 +158,7 @@ struct Recorder {
 pub(crate) struct PhaseTimes {
     /// By phase.
     pub(crate) phases: [Histogram<u64>; Phase::ALL.len()],
-    /// The sum of all phases of a step, without that of the solver.
+    /// The sum of all phases of a step except the solver's.
     pub(crate) outside_solver: Histogram<u64>,
 }
 

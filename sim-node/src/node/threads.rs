@@ -1,4 +1,4 @@
-//! The threads of a node: that of the loop, one that wakes readers, and those of the solver, whose number
+//! The threads of a node: the loop, a thread that wakes readers, and the threads of the solver, whose number
 //! changes no bit.
 
 use sim_solver::{Solver, THREADS_MAX};

@@ -45,7 +45,7 @@ pub struct ActionInfo {
 }
 
 /// Declares [`Action`] and [`ACTIONS`]. A row has the effect, the variant, its number, its name in JSON and, if fields have
-/// limits, these in words. A field has its meaning, its form in JSON if that is not the one of its type, its name, its type
+/// limits, the limits in words. A field has its meaning, its form in JSON if its type has another one, its name, its type
 /// and its row in the table.
 ///
 /// ```text
@@ -334,7 +334,7 @@ actions! {
         /// Force on its center in N, beside gravity and the contacts.
         #[serde(default, with = "vector")]
         force: [f32; 3] = three("three numbers in N").optional(ZERO),
-        /// Torque about its center in N m, beside that of the contacts.
+        /// Torque about its center in N m, beside the torque of the contacts.
         #[serde(default, with = "vector")]
         torque: [f32; 3] = three("three numbers in N m").optional(ZERO),
     }
@@ -433,8 +433,8 @@ impl Action {
         action.unwrap_or(Self::Unknown { number })
     }
 
-    /// Checks everything that does not depend on a scene or its state. Every way of a command to a solver or a player
-    /// goes through this check.
+    /// Checks everything that does not depend on a scene or its state. A solver makes this check before it looks at
+    /// either.
     ///
     /// # Errors
     /// [`Reason::NonFinite`], [`Reason::OutOfRange`] or [`Reason::UnknownParameter`], for the first field with a wrong

@@ -116,7 +116,7 @@ pub mod hash {
     }
 }
 
-/// `#[serde(with = "double")]` for an f64 field. A non-finite value is written as a string, like that of an f32.
+/// `#[serde(with = "double")]` for an f64 field. A non-finite value is written as a string, like a non-finite f32.
 pub(crate) mod double {
     use super::{Deserialize, Deserializer, PlainF32, Serialize, Serializer, to_f32};
 

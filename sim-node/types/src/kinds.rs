@@ -82,7 +82,7 @@ names! {
     Mesh = "mesh",
 }
 
-/// Shape, size and pose of a collider, with the fields of all shapes. Those that the shape does not use are 0.
+/// Shape, size and pose of a collider, with the fields of all shapes. Fields that the shape does not use are 0.
 /// Lengths are in the unit of the scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ColliderFields {

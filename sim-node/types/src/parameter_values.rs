@@ -129,7 +129,7 @@ impl ParameterValues {
         self.get(parameter, Part::All).number()
     }
 
-    /// Returns a whole number, such as that of substeps.
+    /// Returns a whole number, such as the number of substeps.
     pub fn count(&self, parameter: Parameter) -> u32 {
         to_count(self.number(parameter))
     }
@@ -142,7 +142,7 @@ impl ParameterValues {
         }
     }
 
-    /// Returns by kind the compliance or stiffness that replaces that of every constraint of the kind.
+    /// Returns by kind the compliance or stiffness that replaces the softness of every constraint of the kind.
     pub fn softness(&self) -> [Option<f32>; ConstraintKind::ALL.len()] {
         ConstraintKind::ALL.map(|kind| {
             let value = |parameter| self.get(parameter, Part::Kind(kind)).number();
@@ -150,7 +150,7 @@ impl ParameterValues {
         })
     }
 
-    /// Returns the rigidity that replaces that of the bends of a block, or of all bends.
+    /// Returns the rigidity that replaces the rigidity of the bends of a block, or of all bends.
     pub fn bending(&self, block: Option<u32>) -> Option<f32> {
         self.get(Parameter::Bending, block.map_or(Part::All, Part::Block)).number()
     }
@@ -162,7 +162,7 @@ impl ParameterValues {
         self
     }
 
-    /// Stores a value without a check of its range. A value for the whole scene replaces those of all kinds or blocks. Off
+    /// Stores a value without a check of its range. A value for the whole scene replaces the values of all kinds or blocks. Off
     /// means 0 for a parameter that cannot be off. A value of another form and a value for another part change nothing.
     pub fn set(&mut self, setting: Setting) {
         let Setting { parameter, part, value } = setting;
@@ -210,7 +210,7 @@ impl ParameterValues {
         }
     }
 
-    /// Returns all values, by parameter and then by kind, and then those of blocks.
+    /// Returns all values, by parameter and then by kind, and then the values of blocks.
     pub fn settings(&self) -> Vec<Setting> {
         let of_parameters = PARAMETERS
             .iter()

@@ -13,7 +13,7 @@ pub(crate) struct Follow<'a> {
     pub(crate) object: MovedObject,
     pub(crate) index: u32,
     pub(crate) points: &'a [PathPoint],
-    /// The points come after those of the motion under way.
+    /// Appends the points to the motion under way.
     pub(crate) append: bool,
 }
 
@@ -201,7 +201,7 @@ impl Solver {
         if is_accepted { Ok(()) } else { Err(Reason::OutOfRange) }
     }
 
-    /// Checks that the points of all motions fit into a keyframe if this one replaces that of its object.
+    /// Checks that the points of all motions fit into a keyframe if this motion replaces the present motion of its object.
     fn check_room(&self, object: (MovedObject, u32), motion: &Motion) -> Result<(), Reason> {
         let count = |motion: &Motion| motion.point_count(self.scene_step);
         let replaced = self.motion_of(object).map_or(0, count);

@@ -21,7 +21,7 @@ pub struct BodyMotion {
     pub angular_velocity: [f32; 3],
     /// Force beside gravity and contacts, in kg unit / s^2.
     pub force: [f32; 3],
-    /// Torque about its center beside that of contacts, in kg unit^2 / s^2.
+    /// Torque about its center beside the torque of contacts, in kg unit^2 / s^2.
     pub torque: [f32; 3],
 }
 
@@ -89,7 +89,7 @@ pub(crate) struct BodyState {
 }
 
 impl DrivenBody {
-    /// `center` and `axes` are those of the collider at load.
+    /// `center` and `axes` belong to the collider at load.
     pub(crate) fn new(
         body: &ColliderBody,
         (center, axes): (Vec3, Quat),
