@@ -34,9 +34,9 @@ fn is_grabbed(particle: &ParticleState) -> bool {
     particle.flags & ParticleFlags::GRABBED != 0
 }
 
-/// A message of a grab: type "grab" or "move".
+/// A message of a grab: kind "grab" or "move".
 fn grab(kind: &str, target: [f32; 3]) -> Value {
-    json!({ "type": kind, "particle": 90, "target": target })
+    json!({ "kind": kind, "particle": 90, "target": target })
 }
 
 #[test]
@@ -52,7 +52,7 @@ fn a_page_receives_the_state_that_the_node_publishes() {
     let pinned = (0..14).map(|particle| FlaggedParticle { particle, flags: 1 });
     assert_eq!(pins.particles, pinned.collect::<Vec<_>>());
     page.frame(|frame| frame.head.stamp.step > 60);
-    page.applied(json!({ "type": "pause" }));
+    page.applied(json!({ "kind": "pause" }));
     page.text_with("node", "is_paused", &json!(true));
     let mut node = Client::attach(&sandbox.endpoint()).unwrap();
     let snapshot = node.latest_snapshot(DEADLINE).unwrap().unwrap();
@@ -76,7 +76,7 @@ fn a_particle_follows_the_grab_of_a_page_and_is_released_when_the_page_disconnec
     page.applied(grab("grab", [0.2, 0.5, 0.5]));
     assert_eq!(other.rejected(grab("grab", [0.0; 3])), "grabbed_by_other");
     assert_eq!(other.rejected(grab("move", [0.0; 3])), "grabbed_by_other");
-    assert_eq!(other.rejected(json!({ "type": "release", "particle": 3 })), "not_grabbed");
+    assert_eq!(other.rejected(json!({ "kind": "release", "particle": 3 })), "not_grabbed");
     page.send(&grab("move", [0.3, 0.5, 0.4]));
     wait_for_particle(&mut node, 90, "the particle at its target", |particle| {
         is_grabbed(particle) && particle.position == [0.3, 0.5, 0.4]
@@ -84,7 +84,7 @@ fn a_particle_follows_the_grab_of_a_page_and_is_released_when_the_page_disconnec
     drop(page);
     wait_for_particle(&mut node, 90, "the release", |one| !is_grabbed(one));
     other.applied(grab("grab", [0.2, 0.5, 0.5]));
-    other.applied(json!({ "type": "release", "particle": 90 }));
+    other.applied(json!({ "kind": "release", "particle": 90 }));
     wait_for_particle(&mut node, 90, "the release", |one| !is_grabbed(one));
 }
 
@@ -98,7 +98,7 @@ fn grabs_of_pages_are_released_when_the_bridge_ends() {
     page.applied(grab("grab", [0.2, 0.5, 0.5]));
     wait_for_particle(&mut node, 90, "the grab", is_grabbed);
     // While the node is paused, the bridge is blocked on the next state.
-    page.applied(json!({ "type": "pause" }));
+    page.applied(json!({ "kind": "pause" }));
     page.statistics(|statistics| statistics.flags & statistics_flag::PAUSED != 0);
     page.statistics(|_| true);
     let ended = bridge.process.interrupt();
@@ -128,47 +128,47 @@ fn pages_can_pin_cut_brush_set_step_reset_and_load() {
     let bridge = Bridge::start(&sandbox);
     let mut page = bridge.page();
     let epoch = page.scene().stamp.epoch;
-    page.applied(json!({ "type": "pin", "particle": 100 }));
-    let cut = json!({ "type": "cut", "epoch": epoch, "constraints": [300, 301, 302] });
+    page.applied(json!({ "kind": "pin", "particle": 100 }));
+    let cut = json!({ "kind": "cut_constraints", "epoch": epoch, "constraints": [300, 301, 302] });
     let outcome = page.command(cut.clone());
     assert_eq!((&outcome["applied"], &outcome["rejected"]), (&json!(3), &json!(0)));
     let tear = page.tear();
     assert_eq!((tear.first, tear.constraints()), (0, vec![300, 301, 302]));
     assert_eq!(page.rejected(cut), "already_torn");
-    let stale = json!({ "type": "cut", "epoch": epoch + 1, "constraints": [1] });
+    let stale = json!({ "kind": "cut_constraints", "epoch": epoch + 1, "constraints": [1] });
     assert_eq!(page.rejected(stale), "stale_epoch");
     let brush = |eye: [f32; 3]| {
-        json!({ "type": "brush", "eye": eye, "ray": [0, 0, -1], "radius": 0.2,
+        json!({ "kind": "brush", "eye": eye, "ray": [0, 0, -1], "radius": 0.2,
             "delta": [0, 0, 0.05], "over_s": 0.016, "cap": 0.1 })
     };
     assert_eq!(page.command(brush([0.0, 0.5, 3.0]))["applied"], 1);
     assert_eq!(page.command(brush([9.0, 0.5, 3.0]))["applied"], 0);
-    page.applied(json!({ "type": "set", "parameter": "gravity", "value": [0, -1.5, 0] }));
+    page.applied(json!({ "kind": "set", "parameter": "gravity", "value": [0, -1.5, 0] }));
     let parameters = page.text(|text| text["values"]["gravity"][1] == -1.5);
     assert_eq!(
         (&parameters["is_complete"], &parameters["initial"]["gravity"][1]),
         (&json!(true), &json!(-9.81))
     );
     assert_eq!(
-        page.rejected(json!({ "type": "set", "parameter": "stiffness", "value": 0.5 })),
+        page.rejected(json!({ "kind": "set", "parameter": "stiffness", "value": 0.5 })),
         "no_effect_here"
     );
-    assert_eq!(page.rejected(json!({ "type": "step" })), "no_effect_here");
-    let paused_before = page.applied(json!({ "type": "pause" }));
+    assert_eq!(page.rejected(json!({ "kind": "step", "count": 1 })), "no_effect_here");
+    let paused_before = page.applied(json!({ "kind": "pause" }));
     let last = paused_before + 2;
-    page.frame_after(json!({ "type": "step", "count": 3 }), |frame| frame.head.stamp.step == last);
-    page.applied(json!({ "type": "resume" }));
-    let reset = page.applied(json!({ "type": "reset" }));
+    page.frame_after(json!({ "kind": "step", "count": 3 }), |frame| frame.head.stamp.step == last);
+    page.applied(json!({ "kind": "resume" }));
+    let reset = page.applied(json!({ "kind": "reset" }));
     let tear = page.tear();
     assert!(tear.torn.is_empty() && tear.first == 0 && tear.stamp.step >= reset);
     check_refusals(&mut page);
-    page.send(&json!({ "type": "load", "scene": "rope" }));
+    page.send(&json!({ "kind": "load", "scene": "rope" }));
     let rope = page.scene();
     assert_eq!((rope.text.name.as_str(), rope.positions.len()), ("rope", 41));
     assert_ne!(rope.stamp.epoch, epoch);
     page.frame(|frame| frame.head.stamp.epoch == rope.stamp.epoch);
     // Another rate begins a new run, which the page follows.
-    page.applied(json!({ "type": "load", "scene": "ragdoll" }));
+    page.applied(json!({ "kind": "load", "scene": "ragdoll" }));
     let ragdoll = page.scene();
     assert_eq!(ragdoll.text.name, "ragdoll");
     page.frame(|frame| frame.head.stamp.epoch == ragdoll.stamp.epoch);
@@ -177,10 +177,10 @@ fn pages_can_pin_cut_brush_set_step_reset_and_load() {
 /// Checks commands that a live node or the bridge refuses.
 fn check_refusals(page: &mut Page) {
     for (message, reason) in [
-        (json!({ "type": "load", "scene": "/etc/passwd.toml" }), "unknown_scene"),
-        (json!({ "type": "seek", "step": 3 }), "only_replay"),
-        (json!({ "type": "step", "count": -3 }), "only_replay"),
-        (json!({ "type": "pin", "particle": 100_000 }), "unknown_particle"),
+        (json!({ "kind": "load", "scene": "/etc/passwd.toml" }), "unknown_scene"),
+        (json!({ "kind": "seek", "step": 3 }), "only_replay"),
+        (json!({ "kind": "step_back", "count": 3 }), "only_replay"),
+        (json!({ "kind": "pin", "particle": 100_000 }), "unknown_particle"),
     ] {
         assert_eq!(page.rejected(message.clone()), reason, "{message}");
     }
@@ -212,7 +212,7 @@ fn pages_wait_for_a_node_and_report_when_it_is_lost_and_back() {
     let text = page.text(|text| text["type"] == "node" && text["text"] != "");
     assert_eq!(text["state"], "none");
     assert!(text["text"].as_str().unwrap().contains("sim-node run"), "{text}");
-    assert_eq!(page.rejected(json!({ "type": "pause" })), "no_node");
+    assert_eq!(page.rejected(json!({ "kind": "pause" })), "no_node");
 
     let node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
     let first = page.scene();
@@ -220,7 +220,7 @@ fn pages_wait_for_a_node_and_report_when_it_is_lost_and_back() {
     // A killed node cannot announce its end.
     node.signal(Signal::KILL);
     page.text_with("node", "state", &json!("lost"));
-    assert_eq!(page.rejected(json!({ "type": "pause" })), "no_node");
+    assert_eq!(page.rejected(json!({ "kind": "pause" })), "no_node");
     drop(node);
 
     let node = Process::start_ready(Program::SimNode, &sandbox, &["run", "rope"]);
@@ -258,10 +258,10 @@ fn a_page_loads_a_scene_file_that_the_viewer_was_given_and_no_other() {
     let entry = json!({ "name": "dot", "rate_hz": 240, "dimensions": 3, "text": dot });
     assert_eq!(last, entry);
     assert_eq!(page.scene().text.name, "rope");
-    page.applied(json!({ "type": "load", "scene": "dot" }));
+    page.applied(json!({ "kind": "load", "scene": "dot" }));
     assert_eq!(page.scene().text.name, "dot");
     for scene in [&dot, &hidden, "hidden"] {
-        assert_eq!(page.rejected(json!({ "type": "load", "scene": scene })), "unknown_scene");
+        assert_eq!(page.rejected(json!({ "kind": "load", "scene": scene })), "unknown_scene");
     }
 }
 

@@ -58,7 +58,7 @@ fn receive_frames(host: &str, end_ns: u64) -> anyhow::Result<Received> {
     let stream = TcpStream::connect(host).with_context(|| format!("connecting to {host}"))?;
     stream.set_nodelay(true)?;
     let (mut socket, _) = tungstenite::client(format!("ws://{host}/socket"), stream)?;
-    socket.send(Message::text(r#"{"type":"hello","protocol":2}"#))?;
+    socket.send(Message::text(r#"{"type":"hello","protocol":3}"#))?;
     let mut received = Received::default();
     while monotonic_ns() < end_ns {
         let Message::Binary(bytes) = socket.read()? else { continue };

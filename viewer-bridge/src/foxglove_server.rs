@@ -10,7 +10,6 @@ mod parameter_requests;
 mod parameters;
 mod playback;
 mod proxy;
-mod published_command;
 mod publisher;
 mod request_bridge;
 mod server;
@@ -20,5 +19,4 @@ mod sink;
 mod tests;
 
 pub use options::{FoxgloveOptions, FoxglovePermission, FoxgloveServerError};
-pub use published_command::parse as parse_published_command;
 pub use server::FoxgloveServer;

@@ -30,7 +30,6 @@ pub mod wire;
 
 pub use foxglove_server::{
     FoxgloveOptions, FoxglovePermission, FoxgloveServer, FoxgloveServerError,
-    parse_published_command,
 };
 pub use pages::hub::Hub;
 pub use pages::recordings::Recordings;

@@ -1,9 +1,10 @@
 //! Limits on everything that a client can request or leave unread, each with its reason.
 
+use std::ops::RangeInclusive;
 use std::time::Duration;
 
 /// Protocol number. The server and a page with different numbers do not understand each other.
-pub const PROTOCOL: u32 = 2;
+pub const PROTOCOL: u32 = 3;
 /// Pages at a time, and Foxglove clients at a time: each costs memory and a share of the network.
 pub const CLIENTS_MAX: usize = 16;
 /// Connections at a time that are not clients: they request files, or have not sent a valid first
@@ -68,6 +69,8 @@ pub const CARRIED_MAX: usize = 64;
 pub const PARTICLES_INSPECTED_MAX: usize = 32;
 /// Steps in one command.
 pub const STEPS_AT_ONCE_MAX: u32 = 10_000;
+/// Pace of a replay, in multiples of real time.
+pub const REPLAY_RATES: RangeInclusive<f32> = 0.1..=10.0;
 /// Largest scene whose positions are sent as f32 to a page that leaves the choice to the server.
 pub const F32_PARTICLES_MAX: usize = 4096;
 /// Shapes of a scene that pages learn of. They only draw the others more plainly.

@@ -31,6 +31,7 @@ pub struct Request {
 
 /// The content of a request.
 #[derive(Debug, Clone, PartialEq)]
+#[allow(clippy::large_enum_variant, reason = "a full queue has less than 1 MiB")]
 pub enum RequestKind {
     /// The client needs the newest state even if nothing has changed: it has just arrived, or the
     /// newest state was not encoded in its format.
@@ -40,12 +41,7 @@ pub enum RequestKind {
     /// The client has left. Its grabs must end.
     Left,
     /// The client wants something to be done. The numbers in the command are finite and in range.
-    Command {
-        /// The client's number for the command.
-        id: Option<u32>,
-        /// The command.
-        command: Command,
-    },
+    Command(Command),
 }
 
 impl RequestKind {
@@ -110,7 +106,7 @@ impl RequestSender {
     /// always be noticed. A request for a state is dropped if enough others wait, because the state that
     /// they cause goes to every client.
     pub(crate) fn send(&self, client: ClientId, kind: RequestKind) -> Result<(), QueueFull> {
-        let is_command = matches!(kind, RequestKind::Command { .. });
+        let is_command = matches!(kind, RequestKind::Command(_));
         if is_command && self.counts.all.load(Ordering::Relaxed) >= REQUESTS_QUEUED_MAX {
             return Err(QueueFull);
         }
@@ -127,13 +123,15 @@ impl RequestSender {
 
 #[cfg(test)]
 mod tests {
+    use sim_contract::Action;
+
     use super::*;
 
     #[test]
     fn a_flood_of_demands_leaves_room_for_commands_and_departures() {
         let (sender, requests) = requests();
         let client = ClientId::FoxgloveCaller(1);
-        let command = RequestKind::Command { id: None, command: Command::Pause {} };
+        let command = RequestKind::Command(Command::new(Action::Pause));
         for kind in [RequestKind::State, RequestKind::Credit] {
             (0..100_000).for_each(|_| assert_eq!(sender.send(client, kind.clone()), Ok(())));
         }

@@ -5,9 +5,8 @@ use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::sample::{Index, select};
 use serde_json::{Map, Value};
-use sim_contract::COORDINATE_MAX;
-use viewer_bridge::message::{Command, FromPage, check};
-use viewer_bridge::parse_published_command;
+use sim_contract::{Action, COORDINATE_MAX};
+use viewer_bridge::message::{CommandKind, FromPage, parse_published};
 
 /// Fields with coordinates, whose absolute values are limited.
 const COORDINATES: [&str; 11] = [
@@ -50,30 +49,37 @@ fn messages() -> Vec<Value> {
 /// Checks the command of a message that was decoded.
 fn examine(bytes: &[u8]) {
     let Ok(message) = FromPage::decode(bytes) else { return };
-    // Only JSON objects with a type are messages.
+    // Only JSON objects with a type or a kind are messages.
     let sent: Map<String, Value> = serde_json::from_slice(bytes).unwrap();
-    assert!(sent["type"].is_string());
-    if let FromPage::Command { command, .. } = message {
-        assert_eq!(sent["type"], command.name());
-        examine_command(&command, &sent);
+    if let FromPage::Command(command) = message {
+        assert_eq!(sent["kind"], command.kind.name());
+        examine_command(&command.kind, &sent);
+    } else {
+        assert!(sent["type"].is_string());
     }
 }
 
 /// Checks that a command in range was sent with numbers in range.
-fn examine_command(command: &Command, sent: &Map<String, Value>) {
-    if check(command).is_err() {
+fn examine_command(command: &CommandKind, sent: &Map<String, Value>) {
+    if command.check().is_err() {
         return;
     }
     let vector = |field: &str| -> Option<Vec<f64>> {
         Some(sent.get(field)?.as_array()?.iter().map(|axis| axis.as_f64().unwrap()).collect())
     };
-    for axis in COORDINATES.iter().filter_map(|field| vector(field)).flatten() {
+    // The limit of a push applies first.
+    let is_limited = |field: &str| field == "delta" && sent.contains_key("limit");
+    let coordinates = COORDINATES.iter().filter(|field| !is_limited(field));
+    for axis in coordinates.filter_map(|field| vector(field)).flatten() {
         assert!(axis.abs() <= f64::from(COORDINATE_MAX), "{command:?}");
     }
     for vector in DIRECTIONS.iter().filter_map(|field| vector(field)) {
         assert!(vector.iter().any(|axis| *axis != 0.0), "{command:?}");
     }
-    if !matches!(command, Command::Load { .. } | Command::Set { .. }) {
+    if !matches!(
+        command,
+        CommandKind::Action(Action::Load { .. } | Action::Set { .. } | Action::Mark { .. })
+    ) {
         let text = format!("{command:?}");
         assert!(!text.contains("NaN") && !text.contains("inf"), "{text}");
     }
@@ -92,10 +98,10 @@ fn the_beginning_of_a_message_is_malformed() {
 
 #[test]
 fn deep_nesting_is_malformed() {
-    for opening in ["[", "{\"type\":", "{\"type\":\"cut\",\"constraints\":["] {
+    for opening in ["[", "{\"type\":", "{\"kind\":\"cut_constraints\",\"constraints\":["] {
         let text = opening.repeat((64 << 10) / opening.len());
         assert!(FromPage::decode(text.as_bytes()).is_err());
-        assert!(parse_published_command(text.as_bytes(), 1).is_err());
+        assert!(parse_published(text.as_bytes()).is_err());
     }
 }
 
@@ -131,7 +137,7 @@ proptest! {
     #[test]
     fn any_bytes_are_decoded_or_malformed(bytes in vec(any::<u8>(), 0..200)) {
         examine(&bytes);
-        let _command = parse_published_command(&bytes, 1);
+        let _command = parse_published(&bytes);
     }
 
     #[test]
@@ -149,9 +155,8 @@ proptest! {
     #[test]
     fn a_message_with_other_fields_is_in_range_or_refused(text in altered_message()) {
         examine(text.as_bytes());
-        let published = text.replace("\"type\":", "\"kind\":");
-        if let Ok(command) = parse_published_command(published.as_bytes(), 1) {
-            examine_command(&command, &serde_json::from_str(&published).unwrap());
+        if let Ok(action) = parse_published(text.as_bytes()) {
+            examine_command(&action.into(), &serde_json::from_str(&text).unwrap());
         }
     }
 }

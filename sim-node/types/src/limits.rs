@@ -1,5 +1,7 @@
 //! The limits of scenes, and ranges of numbers and indices with their text for error messages.
 
+use crate::reason::Reason;
+
 /// Most particles, and most constraints, of a scene: indices below 2^24 are exact in f32.
 pub const ELEMENTS_MAX: u32 = 1 << 24;
 /// Most colliders of a scene: each substep tests every free particle against every collider.
@@ -70,7 +72,8 @@ impl NumberRange {
     /// Pace of a node in multiples of real time.
     pub const TIME_SCALE: Self = Self::closed(1e-3, 1e3, "0.001 to 1000");
 
-    const fn closed(min: f32, max: f32, text: &'static str) -> Self {
+    /// A range with both of its ends.
+    pub const fn closed(min: f32, max: f32, text: &'static str) -> Self {
         Self { min, max, excludes_min: false, excludes_max: false, text }
     }
 
@@ -79,6 +82,18 @@ impl NumberRange {
         let is_above_min = if self.excludes_min { number > self.min } else { number >= self.min };
         let is_below_max = if self.excludes_max { number < self.max } else { number <= self.max };
         is_above_min && is_below_max
+    }
+
+    /// Checks numbers from outside.
+    ///
+    /// # Errors
+    /// A number is not finite, or not in the range.
+    pub fn check(&self, numbers: &[f32]) -> Result<(), Reason> {
+        if !numbers.iter().all(|number| number.is_finite()) {
+            return Err(Reason::NonFinite);
+        }
+        let is_allowed = numbers.iter().all(|number| self.contains(*number));
+        if is_allowed { Ok(()) } else { Err(Reason::OutOfRange) }
     }
 }
 

@@ -19,14 +19,14 @@ const MESH: &str =
 const PAGE_MESSAGES: [&str; 10] = [
     r#"{"type":"hello","protocol":1,"token":"abc","format":"u16"}"#,
     r#"{"type":"ack","frame":7}"#,
-    r#"{"type":"brush","eye":[0,0,1],"ray":[0,0,-1],"radius":0.1,"delta":[0.1,0,0],"over_s":0.1,"cap":0.5}"#,
-    r#"{"id":1,"type":"cut","epoch":1,"constraints":[1,2,3]}"#,
-    r#"{"type":"seek","step":10}"#,
-    r#"{"type":"loop","is_on":true}"#,
-    r#"{"type":"ghost","name":"changed"}"#,
-    r#"{"type":"lift","epoch":1,"object":"collider","index":0}"#,
-    r#"{"type":"carry","object":"collider","index":0,"offset":[0.1,0,0],"over_s":0.02}"#,
-    r#"{"type":"throw","object":"anchor","index":0,"velocity":[1,0,0]}"#,
+    r#"{"kind":"brush","eye":[0,0,1],"ray":[0,0,-1],"radius":0.1,"delta":[0.1,0,0],"over_s":0.1,"cap":0.5}"#,
+    r#"{"id":1,"kind":"cut_constraints","epoch":1,"constraints":[1,2,3]}"#,
+    r#"{"kind":"seek","step":10}"#,
+    r#"{"kind":"loop","is_on":true}"#,
+    r#"{"kind":"ghost","name":"changed"}"#,
+    r#"{"kind":"lift","epoch":1,"object":"collider","index":0}"#,
+    r#"{"kind":"carry","object":"collider","index":0,"offset":[0.1,0,0],"over_s":0.02}"#,
+    r#"{"kind":"throw","object":"anchor","index":0,"velocity":[1,0,0]}"#,
 ];
 /// Steps of a recording whose messages form one seed.
 const STEPS_PER_SEED: usize = 3;

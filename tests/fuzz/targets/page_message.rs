@@ -4,8 +4,7 @@
 
 use libfuzzer_sys::fuzz_target;
 use sim_contract::Action;
-use viewer_bridge::message::{FromPage, check};
-use viewer_bridge::parse_published_command;
+use viewer_bridge::message::{FromPage, parse_published};
 
 fuzz_target!(|data: &[u8]| {
     let message = FromPage::decode(data);
@@ -16,8 +15,8 @@ fuzz_target!(|data: &[u8]| {
             fuzz::assert_same(reformatted, message);
         }
     }
-    if let Ok(FromPage::Command { command, .. }) = &message
-        && check(command).is_ok()
+    if let Ok(FromPage::Command(command)) = &message
+        && command.kind.check().is_ok()
     {
         assert_finite(&format!("{command:?}"));
     }
@@ -25,14 +24,14 @@ fuzz_target!(|data: &[u8]| {
 });
 
 fn check_published(data: &[u8]) {
-    let Ok(command) = parse_published_command(data, 1) else { return };
-    if check(&command).is_ok() {
-        assert_finite(&format!("{command:?}"));
+    let Ok(accepted) = parse_published(data) else { return };
+    if accepted.validate().is_ok() {
+        assert_finite(&format!("{accepted:?}"));
     }
     let action: Action = serde_json::from_slice(data).expect("a published command is an action");
     let text = serde_json::to_vec(&action).expect("an action has a JSON form");
-    let again = parse_published_command(&text, 1).expect("a printed action is valid");
-    fuzz::assert_same(&again, &command);
+    let again = parse_published(&text).expect("a printed action is valid");
+    fuzz::assert_same(&again, &accepted);
 }
 
 /// Asserts that the numbers of a command are finite, outside of its texts.

@@ -44,7 +44,7 @@ impl World {
             Visit::Download => download(stream, host),
             Visit::Page => drop(open_page(stream, host)),
             Visit::GrabbingPage => {
-                let grab = json!({ "type": "grab", "particle": 20, "target": [0.5, 0.2, 0.3] });
+                let grab = json!({ "kind": "grab", "particle": 20, "target": [0.5, 0.2, 0.3] });
                 send(&mut open_page(stream, host), &grab);
             }
             Visit::Nonsense => {
@@ -68,7 +68,7 @@ fn download(mut stream: TcpStream, host: &str) {
 fn open_page(stream: TcpStream, host: &str) -> WebSocket<TcpStream> {
     let connected = tungstenite::client(format!("ws://{host}/socket"), stream);
     let (mut page, _) = connected.expect("a bridge that accepts pages");
-    send(&mut page, &json!({ "type": "hello", "protocol": 2, "format": "f32" }));
+    send(&mut page, &json!({ "type": "hello", "protocol": 3, "format": "f32" }));
     let answer = loop {
         if let Message::Text(text) = page.read().expect("an answer") {
             break serde_json::from_str::<Value>(&text).expect("an object");

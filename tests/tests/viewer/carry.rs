@@ -44,7 +44,7 @@ impl Stage {
     /// Pauses the node, and makes a step.
     fn new(bridge: &Bridge) -> Self {
         let mut page = bridge.page();
-        page.applied(json!({ "type": "pause" }));
+        page.applied(json!({ "kind": "pause" }));
         let mut stage = Self { page, step: 0, ball: [0.0; 3] };
         stage.skip_step();
         stage
@@ -52,12 +52,12 @@ impl Stage {
 
     /// Makes a step and ignores its frame.
     fn skip_step(&mut self) {
-        self.step = self.page.applied(json!({ "type": "step" }));
+        self.step = self.page.applied(json!({ "kind": "step", "count": 1 }));
     }
 
     /// Makes a step, and returns what the page sees of it. The bridge has sent the moves for the next step before.
     fn make_step(&mut self) -> Places {
-        self.page.send(&json!({ "type": "step" }));
+        self.page.send(&json!({ "kind": "step", "count": 1 }));
         self.step += 1;
         let (step, ball) = (self.step, &mut self.ball);
         self.page.receive("the step", |message| match message {
@@ -92,8 +92,8 @@ fn a_page_carries_a_ball_and_an_anchor_in_equal_parts_and_throws_them() {
 
     let begin = stage.make_step();
     let epoch = bridge.page().scene().stamp.epoch;
-    let lift = |kind: &str| json!({ "type": "lift", "epoch": epoch, "object": kind, "index": 0 });
-    let carry = |kind: &str| json!({ "type": "carry", "object": kind, "index": 0, "offset": [0.4, 0, 0], "over_s": 0.04 });
+    let lift = |kind: &str| json!({ "kind": "lift", "epoch": epoch, "object": kind, "index": 0 });
+    let carry = |kind: &str| json!({ "kind": "carry", "object": kind, "index": 0, "offset": [0.4, 0, 0], "over_s": 0.04 });
     assert_eq!(stage.page.rejected(carry("collider")), "not_grabbed");
     for message in [lift("collider"), lift("anchor"), carry("collider"), carry("anchor")] {
         let answer = stage.page.command(message);
@@ -109,7 +109,7 @@ fn a_page_carries_a_ball_and_an_anchor_in_equal_parts_and_throws_them() {
 
     let mut other = bridge.page();
     assert_eq!(other.rejected(lift("collider")), "grabbed_by_other");
-    let throw = |kind: &str, x: f64| json!({ "type": "throw", "object": kind, "index": 0, "velocity": [x, 0, 0] });
+    let throw = |kind: &str, x: f64| json!({ "kind": "throw", "object": kind, "index": 0, "velocity": [x, 0, 0] });
     assert_eq!(other.rejected(throw("collider", 1.0)), "not_grabbed");
     stage.page.send(&throw("anchor", 0.0));
     assert_eq!(stage.page.command(throw("collider", 3.0))["status"], "applied");
@@ -119,7 +119,7 @@ fn a_page_carries_a_ball_and_an_anchor_in_equal_parts_and_throws_them() {
     assert!(near(flown.anchored, there.anchored), "an anchor put down stays: {flown:?}");
 
     // A reset puts everything back, and ends the throw.
-    stage.page.applied(json!({ "type": "reset" }));
+    stage.page.applied(json!({ "kind": "reset" }));
     stage.skip_step();
     let back = stage.make_step();
     let next = stage.make_step();
@@ -130,10 +130,10 @@ fn a_page_carries_a_ball_and_an_anchor_in_equal_parts_and_throws_them() {
     for (kind, index, reason) in
         [("collider", 1, "unknown_collider"), ("anchor", 1, "unknown_anchor")]
     {
-        let message = json!({ "type": "lift", "epoch": epoch, "object": kind, "index": index });
+        let message = json!({ "kind": "lift", "epoch": epoch, "object": kind, "index": index });
         assert_eq!(stage.page.rejected(message), reason);
     }
-    let message = json!({ "type": "lift", "epoch": epoch + 1, "object": "anchor", "index": 0 });
+    let message = json!({ "kind": "lift", "epoch": epoch + 1, "object": "anchor", "index": 0 });
     assert_eq!(stage.page.rejected(message), "stale_epoch");
 }
 
@@ -146,8 +146,8 @@ fn a_carried_object_is_a_change_of_others_to_a_page_that_undoes() {
     let (mut page, mut other) = (bridge.page(), bridge.page());
     let epoch = page.scene().stamp.epoch;
     page.frame(|_| true);
-    page.applied(json!({ "type": "cut", "epoch": epoch, "constraints": [0] }));
-    let lift = json!({ "type": "lift", "epoch": epoch, "object": "collider", "index": 0 });
+    page.applied(json!({ "kind": "cut_constraints", "epoch": epoch, "constraints": [0] }));
+    let lift = json!({ "kind": "lift", "epoch": epoch, "object": "collider", "index": 0 });
     assert_eq!(other.command(lift)["status"], "applied");
-    assert_eq!(page.rejected(json!({ "type": "undo" })), "changed_by_others");
+    assert_eq!(page.rejected(json!({ "kind": "undo" })), "changed_by_others");
 }

@@ -66,7 +66,7 @@ fn ghost_in(page: &mut Page, state: &str) -> Value {
 
 /// Seeks, and returns the ghost that the page receives with the frame of the step.
 fn seek(page: &mut Page, step: u64) -> Option<Ghost> {
-    page.send(&json!({ "type": "seek", "step": step }));
+    page.send(&json!({ "kind": "seek", "step": step }));
     next_ghost(page, step)
 }
 
@@ -132,7 +132,7 @@ fn pages_choose_a_ghost_from_the_folder() {
     assert_eq!((&none["state"], &none["text"]), (&json!("none"), &json!("")));
     assert_eq!(seek(&mut page, 3), None);
 
-    page.send(&json!({ "type": "ghost", "name": "short" }));
+    page.send(&json!({ "kind": "ghost", "name": "short" }));
     let equal = ghost_in(&mut page, "equal");
     assert_eq!(equal["text"], "short: 101 common steps, equal in every bit");
     assert_eq!(equal["first_different_step"], Value::Null);
@@ -140,16 +140,16 @@ fn pages_choose_a_ghost_from_the_folder() {
     assert_eq!((ghost.stamp.step, ghost.distance), (100, 0.0));
     assert_eq!(seek(&mut page, 101), None, "the ghost ends before that step");
 
-    page.send(&json!({ "type": "ghost", "name": "rope" }));
+    page.send(&json!({ "kind": "ghost", "name": "rope" }));
     let failed = ghost_in(&mut page, "failed");
     let text = failed["text"].as_str().unwrap();
     assert!(text.contains("particles instead of 168; a ghost must be a recording"), "{text}");
     assert_eq!(seek(&mut page, 50), None);
     for name in ["missing", "../runs/short", ""] {
-        let reason = page.rejected(json!({ "type": "ghost", "name": name }));
+        let reason = page.rejected(json!({ "kind": "ghost", "name": name }));
         assert_eq!(reason, "unknown_recording", "{name}");
     }
-    page.send(&json!({ "type": "ghost" }));
+    page.send(&json!({ "kind": "ghost" }));
     ghost_in(&mut page, "none");
 }
 

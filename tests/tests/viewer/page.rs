@@ -52,7 +52,7 @@ impl Bridge {
     pub(crate) fn page_at(&self, path: &str) -> Page {
         let mut page = self.greet(path, &json!({}));
         page.hello = page.text(|text| text["type"] == "hello");
-        assert_eq!(page.hello["protocol"], 2);
+        assert_eq!(page.hello["protocol"], 3);
         page
     }
 
@@ -80,7 +80,7 @@ impl Bridge {
         stream.set_read_timeout(Some(DEADLINE)).unwrap();
         let (socket, _) = tungstenite::client(format!("ws://{host}{path}"), stream).unwrap();
         let mut page = Page { socket, hello: Value::Null, texts: VecDeque::new(), last_id: 0 };
-        let mut hello = json!({ "type": "hello", "protocol": 2, "format": "f32" });
+        let mut hello = json!({ "type": "hello", "protocol": 3, "format": "f32" });
         hello.as_object_mut().unwrap().extend(fields.as_object().unwrap().clone());
         page.send(&hello);
         page

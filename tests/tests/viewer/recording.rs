@@ -30,7 +30,7 @@ fn in_state(page: &mut Page, name: &str) -> Value {
 /// Starts a recording, and waits until it has snapshots and a size. Returns the path of its file.
 fn record(page: &mut Page) -> String {
     page.text_with("node", "state", &json!("alive"));
-    let answer = page.command(json!({ "type": "record" }));
+    let answer = page.command(json!({ "kind": "record" }));
     assert_eq!(answer["status"], "applied", "{answer}");
     let number = |text: &Value, field: &str| text[field].as_f64().unwrap();
     let shown =
@@ -56,12 +56,12 @@ fn a_recording_of_a_page_is_shown_to_all_pages_verifies_and_opens_in_a_page_of_i
     let bridge = start_bridge(&sandbox);
     let (mut page, mut other) = (bridge.page(), bridge.page());
     in_state(&mut page, "idle");
-    assert_eq!(page.rejected(json!({ "type": "stop_recording" })), "not_recording");
+    assert_eq!(page.rejected(json!({ "kind": "stop_recording" })), "not_recording");
     let path = record(&mut page);
     in_state(&mut other, "recording");
-    assert_eq!(other.rejected(json!({ "type": "record" })), "already_recording");
+    assert_eq!(other.rejected(json!({ "kind": "record" })), "already_recording");
     // Any page can end it.
-    other.send(&json!({ "type": "stop_recording" }));
+    other.send(&json!({ "kind": "stop_recording" }));
     let ended = in_state(&mut page, "finished");
     assert_eq!((&ended["text"], &ended["path"]), (&json!(""), &json!(path)));
     assert_eq!(ended["size_bytes"], fs::metadata(&path).unwrap().len());
@@ -73,14 +73,14 @@ fn a_recording_of_a_page_is_shown_to_all_pages_verifies_and_opens_in_a_page_of_i
     assert_eq!(replay.hello["mode"], "replay");
     assert_eq!(replay.scene().text.name, "curtain");
     let timeline = bridge.page_at(&socket).text(|text| text["type"] == "timeline");
-    replay.frame_after(json!({ "type": "seek", "step": timeline["last_step"] }), |frame| {
+    replay.frame_after(json!({ "kind": "seek", "step": timeline["last_step"] }), |frame| {
         timeline["last_step"] == frame.head.stamp.step
     });
-    assert_eq!(replay.rejected(json!({ "type": "record" })), "only_live");
+    assert_eq!(replay.rejected(json!({ "kind": "record" })), "only_live");
     // The live pages go on, and the next recording has another file.
     let shown = page.frame(|_| true).head.stamp.step;
     page.frame(|frame| frame.head.stamp.step > shown);
-    let answer = page.command(json!({ "type": "record" }));
+    let answer = page.command(json!({ "kind": "record" }));
     assert_eq!(answer["status"], "applied");
     let next = state(&mut page, |text| text["snapshots"].as_u64() > Some(0));
     assert_ne!(next["path"], json!(path));
@@ -133,9 +133,9 @@ fn a_recording_that_is_stopped_at_once_is_complete_with_and_without_a_step() {
         let bridge = start_bridge(&sandbox);
         let mut page = bridge.page();
         page.text_with("node", "state", &json!("alive"));
-        page.send(&json!({ "type": "record" }));
+        page.send(&json!({ "kind": "record" }));
         // The recorder does not handle signals yet.
-        page.send(&json!({ "type": "stop_recording" }));
+        page.send(&json!({ "kind": "stop_recording" }));
         in_state(&mut page, "finishing");
         let ended = state(&mut page, |text| text["state"] != "finishing");
         assert_eq!((&ended["state"], &ended["text"]), (&json!("finished"), &json!("")), "{ended}");
@@ -151,12 +151,12 @@ fn a_recording_ends_with_its_scene_and_with_its_node_and_says_so() {
     let bridge = start_bridge(&sandbox);
     let mut page = bridge.page();
     record(&mut page);
-    page.send(&json!({ "type": "load", "scene": "flag" }));
+    page.send(&json!({ "kind": "load", "scene": "flag" }));
     let ended = in_state(&mut page, "finished");
     assert_eq!(ended["text"], "the recording ended because another scene was loaded");
     // The name comes from the scene that the bridge knows.
     bridge.page().text_with("node", "scene", &json!("flag"));
-    let answer = page.command(json!({ "type": "record" }));
+    let answer = page.command(json!({ "kind": "record" }));
     assert_eq!(answer["status"], "applied", "{answer}");
     let shown = state(&mut page, |text| text["snapshots"].as_u64() > Some(0));
     assert!(shown["path"].as_str().unwrap().contains("/flag_"), "{shown}");
@@ -165,7 +165,7 @@ fn a_recording_ends_with_its_scene_and_with_its_node_and_says_so() {
     assert_eq!(ended["text"], "the recording ended with the node");
     verify(&sandbox, ended["path"].as_str().unwrap());
     page.text_with("node", "state", &json!("lost"));
-    assert_eq!(page.rejected(json!({ "type": "record" })), "no_node");
+    assert_eq!(page.rejected(json!({ "kind": "record" })), "no_node");
 }
 
 #[test]
@@ -177,7 +177,7 @@ fn a_recording_that_fails_names_the_cause_and_the_remedy() {
     let bridge = start_bridge(&sandbox);
     let mut page = bridge.page();
     page.text_with("node", "state", &json!("alive"));
-    page.send(&json!({ "type": "record" }));
+    page.send(&json!({ "kind": "record" }));
     let failed = in_state(&mut page, "failed");
     let text = failed["text"].as_str().unwrap();
     assert!(
@@ -188,7 +188,7 @@ fn a_recording_that_fails_names_the_cause_and_the_remedy() {
 
     // A limit on the size of files stands for a full disk: the recorder inherits it.
     bridge.process.limit_file_size(200_000);
-    page.send(&json!({ "type": "record" }));
+    page.send(&json!({ "kind": "record" }));
     let failed = in_state(&mut page, "failed");
     let text = failed["text"].as_str().unwrap();
     for part in
@@ -211,7 +211,7 @@ fn a_bridge_without_a_recorder_says_where_it_searched() {
     let bridge = Bridge::ready(bridge);
     let mut page = bridge.page();
     page.text_with("node", "state", &json!("alive"));
-    page.send(&json!({ "type": "record" }));
+    page.send(&json!({ "kind": "record" }));
     let failed = in_state(&mut page, "failed");
     let text = failed["text"].as_str().unwrap();
     let folder = Path::new(&program).parent().unwrap().display().to_string();
@@ -232,7 +232,7 @@ fn other_machines_record_only_into_a_chosen_folder_and_open_only_its_recordings(
         let shown = in_state(&mut page, state_name);
         if state_name == "unavailable" {
             assert!(shown["text"].as_str().unwrap().contains("--recordings DIR"), "{shown}");
-            assert_eq!(page.rejected(json!({ "type": "record" })), "recording_not_allowed");
+            assert_eq!(page.rejected(json!({ "kind": "record" })), "recording_not_allowed");
         }
         // The token is checked before anything is opened.
         assert_eq!(bridge.refusal_at("/replay/run/socket", &json!({})).0, 4401);

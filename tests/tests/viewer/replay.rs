@@ -133,13 +133,13 @@ impl View {
 
     /// Seeks to a step, and returns the state shown there.
     fn seek(&mut self, step: u64) -> State {
-        self.page.send(&json!({ "type": "seek", "step": step }));
+        self.page.send(&json!({ "kind": "seek", "step": step }));
         self.shown(|shown| shown == step)
     }
 }
 
 fn seek(step: u64) -> Value {
-    json!({ "type": "seek", "step": step })
+    json!({ "kind": "seek", "step": step })
 }
 
 #[test]
@@ -290,29 +290,29 @@ fn pages_play_pause_step_and_loop_one_recording_together() {
 
     assert_eq!(page.applied(seek(100)), 100);
     other.frame(|frame| frame.head.stamp.step == 100);
-    assert_eq!(other.applied(json!({ "type": "step" })), 101);
-    assert_eq!(other.applied(json!({ "type": "step", "count": -3 })), 98);
-    assert_eq!(other.applied(json!({ "type": "step", "count": 40 })), 138);
+    assert_eq!(other.applied(json!({ "kind": "step", "count": 1 })), 101);
+    assert_eq!(other.applied(json!({ "kind": "step_back", "count": 3 })), 98);
+    assert_eq!(other.applied(json!({ "kind": "step", "count": 40 })), 138);
     page.frame(|frame| frame.head.stamp.step == 138);
     assert_eq!(page.applied(seek(1 << 40)), STEPS);
-    assert_eq!(page.applied(json!({ "type": "step", "count": -10_000 })), 0);
+    assert_eq!(page.applied(json!({ "kind": "step_back", "count": 10_000 })), 0);
 
-    page.applied(json!({ "type": "rate", "value": 10 }));
+    page.applied(json!({ "kind": "set", "parameter": "time_scale", "value": 10 }));
     other.text_with("playback", "rate", &json!(10.0));
-    page.applied(json!({ "type": "resume" }));
+    page.applied(json!({ "kind": "resume" }));
     other.text_with("playback", "is_playing", &json!(true));
     // It pauses at the end, and resuming there starts again at the beginning.
     other.frame(|frame| frame.head.stamp.step == STEPS);
     assert_eq!(other.text_with("playback", "is_playing", &json!(false))["step"], STEPS);
-    page.applied(json!({ "type": "loop", "is_on": true }));
-    page.applied(json!({ "type": "rate", "value": 0.1 }));
+    page.applied(json!({ "kind": "loop", "is_on": true }));
+    page.applied(json!({ "kind": "set", "parameter": "time_scale", "value": 0.1 }));
     page.applied(seek(STEPS - 2));
-    page.applied(json!({ "type": "resume" }));
-    assert_eq!(page.rejected(json!({ "type": "step" })), "no_effect_here");
-    page.applied(json!({ "type": "rate", "value": 5 }));
+    page.applied(json!({ "kind": "resume" }));
+    assert_eq!(page.rejected(json!({ "kind": "step", "count": 1 })), "no_effect_here");
+    page.applied(json!({ "kind": "set", "parameter": "time_scale", "value": 5 }));
     page.frame(|frame| frame.head.stamp.step > STEPS / 2);
     page.frame(|frame| frame.head.stamp.step < STEPS / 2);
-    let step = page.applied(json!({ "type": "pause" }));
+    let step = page.applied(json!({ "kind": "pause" }));
     other.frame(|frame| frame.head.stamp.step == step);
 }
 
@@ -333,13 +333,13 @@ fn a_paused_replay_shows_exactly_what_was_recorded_at_every_size() {
     assert_eq!(view.seek(60), states[60]);
     // While it plays, the positions are rounded. The state at which it stops is exact again.
     let mut page = view.page;
-    page.send(&json!({ "type": "loop", "is_on": true }));
+    page.send(&json!({ "kind": "loop", "is_on": true }));
     let playing =
-        page.frame_after(json!({ "type": "resume" }), |frame| frame.head.flags & PAUSED == 0);
+        page.frame_after(json!({ "kind": "resume" }), |frame| frame.head.flags & PAUSED == 0);
     let place = usize::try_from(playing.head.stamp.step).unwrap();
     assert_ne!(playing.positions, states[place].positions);
     let stopped =
-        page.frame_after(json!({ "type": "pause" }), |frame| frame.head.flags & PAUSED != 0);
+        page.frame_after(json!({ "kind": "pause" }), |frame| frame.head.flags & PAUSED != 0);
     let place = usize::try_from(stopped.head.stamp.step).unwrap();
     assert_eq!(stopped.positions, states[place].positions);
 }
@@ -352,18 +352,21 @@ fn a_recording_cannot_be_changed() {
     let mut page = bridge.page();
     let epoch = page.scene().stamp.epoch;
     for message in [
-        json!({ "type": "grab", "particle": 90, "target": [0, 0, 0] }),
-        json!({ "type": "release", "particle": 90 }),
-        json!({ "type": "pin", "particle": 90 }),
-        json!({ "type": "cut", "epoch": epoch, "constraints": [1] }),
-        json!({ "type": "cut_radius", "center": [0, 0, 0], "radius": 1 }),
-        json!({ "type": "set", "parameter": "damping", "value": 1 }),
-        json!({ "type": "reset" }),
-        json!({ "type": "load", "scene": "rope" }),
+        json!({ "kind": "grab", "particle": 90, "target": [0, 0, 0] }),
+        json!({ "kind": "release", "particle": 90 }),
+        json!({ "kind": "pin", "particle": 90 }),
+        json!({ "kind": "cut_constraints", "epoch": epoch, "constraints": [1] }),
+        json!({ "kind": "cut_radius", "center": [0, 0, 0], "radius": 1 }),
+        json!({ "kind": "set", "parameter": "damping", "value": 1 }),
+        json!({ "kind": "reset" }),
+        json!({ "kind": "load", "scene": "rope" }),
     ] {
         assert_eq!(page.rejected(message.clone()), "only_live", "{message}");
     }
-    assert_eq!(page.rejected(json!({ "type": "rate", "value": 11 })), "out_of_range");
+    assert_eq!(
+        page.rejected(json!({ "kind": "set", "parameter": "time_scale", "value": 11 })),
+        "out_of_range"
+    );
 }
 
 #[test]
@@ -375,10 +378,12 @@ fn a_recording_of_a_live_node_is_shown_as_recorded() {
     let live = Bridge::start(&sandbox);
     let mut page = live.page();
     let epoch = page.scene().stamp.epoch;
-    page.applied(json!({ "type": "cut", "epoch": epoch, "constraints": [300, 301, 302] }));
-    page.applied(json!({ "type": "pin", "particle": 100 }));
-    let reset = page.applied(json!({ "type": "reset" }));
-    page.applied(json!({ "type": "cut", "epoch": epoch, "constraints": [4] }));
+    page.applied(
+        json!({ "kind": "cut_constraints", "epoch": epoch, "constraints": [300, 301, 302] }),
+    );
+    page.applied(json!({ "kind": "pin", "particle": 100 }));
+    let reset = page.applied(json!({ "kind": "reset" }));
+    page.applied(json!({ "kind": "cut_constraints", "epoch": epoch, "constraints": [4] }));
     page.frame(|frame| frame.head.stamp.step > reset + 100);
     recording.interrupt();
     node.interrupt();
@@ -537,8 +542,8 @@ fn ctrl_c_ends_a_playing_replay_cleanly() {
     let file = recording(&sandbox);
     let mut bridge = Bridge::start_with(&sandbox, &["--replay", &file]);
     let mut page = bridge.page();
-    page.applied(json!({ "type": "loop", "is_on": true }));
-    page.applied(json!({ "type": "resume" }));
+    page.applied(json!({ "kind": "loop", "is_on": true }));
+    page.applied(json!({ "kind": "resume" }));
     page.frame(|frame| frame.head.stamp.step > 10);
     assert!(bridge.process.is_running());
     let ended = bridge.process.interrupt();

@@ -33,7 +33,7 @@ impl Setup {
         let mut node = Node::attach(&sandbox.endpoint()).unwrap();
         let mut page = bridge.page();
         let target = [0.2, 0.5, 0.5];
-        page.applied(json!({ "type": "grab", "particle": PAGE_PARTICLE, "target": target }));
+        page.applied(json!({ "kind": "grab", "particle": PAGE_PARTICLE, "target": target }));
         let (mut client, _) = Client::start(&url);
         client.subscribe(1, "/particles");
         client.advertise(1, "/commands");
@@ -61,7 +61,7 @@ fn the_grabs_of_clients_whose_connections_are_reset_end() {
     wait_for_releases(&mut node);
     // Another page can grab the particles.
     let target = json!([0.2, 0.5, 0.5]);
-    bridge.page().applied(json!({ "type": "grab", "particle": PAGE_PARTICLE, "target": target }));
+    bridge.page().applied(json!({ "kind": "grab", "particle": PAGE_PARTICLE, "target": target }));
 }
 
 #[test]

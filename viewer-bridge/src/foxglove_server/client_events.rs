@@ -6,10 +6,12 @@ use foxglove::websocket::{
     ChannelView, Client, ClientChannel, PlaybackControlRequest, PlaybackState, ServerListener,
 };
 
-use super::published_command::TOPIC;
 use super::publisher::Publisher;
 use super::request_bridge::{ANY_CLIENT, RequestBridge};
 use crate::request::{RequestKind, RequestSender};
+
+/// Topic of the actions that clients publish, one JSON object per message.
+const TOPIC: &str = "/commands";
 
 /// Handles the events of the clients. The library calls it from their tasks; it must not block.
 pub(super) struct ClientEvents {

@@ -8,11 +8,9 @@ use foxglove::websocket::{
     Parameter as NamedValue, ParameterType, ParameterValue as FoxgloveValue,
 };
 use sim_contract::{
-    ConstraintKind, KindFilter, OffMeaning, PARAMETERS, Parameter, ParameterInfo, ParameterValue,
+    Action, ConstraintKind, OffMeaning, PARAMETERS, Parameter, ParameterInfo, ParameterValue,
     ParameterValues, Part, Parts, Reason, ValueForm,
 };
-
-use crate::message::Command;
 
 /// Value of a parameter that is off.
 const OFF: &str = "off";
@@ -72,8 +70,8 @@ fn same_decimals(value: f32) -> f64 {
     value.to_string().parse().unwrap_or(f64::from(value))
 }
 
-/// Creates the command that sets a parameter.
-pub(super) fn command(named: &NamedValue) -> Result<Command, Reason> {
+/// Creates the action that sets a parameter.
+pub(super) fn action(named: &NamedValue) -> Result<Action, Reason> {
     let (parameter, part) =
         Parameter::from_path(&named.name).map_err(|_| Reason::UnknownParameter)?;
     let info = parameter.info();
@@ -92,15 +90,7 @@ pub(super) fn command(named: &NamedValue) -> Result<Command, Reason> {
         }
         _ => return Err(Reason::OutOfRange),
     };
-    let (mut constraint_kind, mut block, mut collider) = (None, None, None);
-    match part {
-        Part::All => {}
-        Part::Kind(kind) => constraint_kind = Some(KindFilter::Known(kind)),
-        Part::Block(index) => block = Some(index),
-        Part::Collider(index) => collider = Some(index),
-    }
-    let parameter = parameter.name().to_owned();
-    Ok(Command::Set { parameter, value, constraint_kind, block, collider, stroke: None })
+    Ok(Action::set(parameter.name(), value).for_part(part))
 }
 
 #[allow(clippy::cast_possible_truncation, reason = "the value is rounded once, here")]
@@ -123,8 +113,8 @@ mod tests {
         all.into_iter().find(|one| one.name == name).unwrap().value.unwrap()
     }
 
-    fn command_for(name: &str, value: FoxgloveValue) -> Result<Command, Reason> {
-        command(&NamedValue { name: name.to_owned(), r#type: None, value: Some(value) })
+    fn action_for(name: &str, value: FoxgloveValue) -> Result<Action, Reason> {
+        action(&NamedValue { name: name.to_owned(), r#type: None, value: Some(value) })
     }
 
     #[test]
@@ -139,7 +129,7 @@ mod tests {
             let listed = all.iter().find(|one| one.name == name);
             let listed = listed.unwrap_or_else(|| panic!("{name} is not listed"));
             let is_own = listed.value == Some(FoxgloveValue::String(OWN_OF_EACH.to_owned()));
-            assert_eq!(command(listed).is_ok(), !is_own, "{name}");
+            assert_eq!(action(listed).is_ok(), !is_own, "{name}");
         }
     }
 
@@ -174,42 +164,24 @@ mod tests {
     }
 
     #[test]
-    fn a_value_becomes_a_command() {
-        let set = |parameter: &str, value, constraint_kind| Command::Set {
-            parameter: parameter.to_owned(),
-            value,
-            constraint_kind,
-            block: None,
-            collider: None,
-            stroke: None,
-        };
+    fn a_value_becomes_an_action() {
         let axes = vec![
             FoxgloveValue::Integer(0),
             FoxgloveValue::Float64(-1.5),
             FoxgloveValue::Integer(0),
         ];
-        let value = ParameterValue::Vector([0.0, -1.5, 0.0]);
-        let command = command_for("gravity", FoxgloveValue::Array(axes));
-        assert_eq!(command, Ok(set("gravity", value, None)));
-        let off = FoxgloveValue::String(OFF.to_owned());
-        let command = command_for("tear_force", off);
-        assert_eq!(command, Ok(set("tear_force", ParameterValue::Off, None)));
-        let kind = Some(KindFilter::Known(ConstraintKind::Shear));
-        let value = ParameterValue::Number(0.5);
-        let command = command_for("stiffness.shear", FoxgloveValue::Float64(0.5));
-        assert_eq!(command, Ok(set("stiffness", value, kind)));
-        let command = command_for("bending.12", FoxgloveValue::Float64(0.5));
-        let of_part = |parameter: &str, block, collider| Command::Set {
-            parameter: parameter.to_owned(),
-            value,
-            constraint_kind: None,
-            block,
-            collider,
-            stroke: None,
-        };
-        assert_eq!(command, Ok(of_part("bending", Some(12), None)));
-        let command = command_for("friction.12", FoxgloveValue::Float64(0.5));
-        assert_eq!(command, Ok(of_part("friction", None, Some(12))));
+        let gravity = action_for("gravity", FoxgloveValue::Array(axes));
+        assert_eq!(gravity, Ok(Action::set("gravity", [0.0, -1.5, 0.0])));
+        let off = action_for("tear_force", FoxgloveValue::String(OFF.to_owned()));
+        assert_eq!(off, Ok(Action::set("tear_force", ParameterValue::Off)));
+        for (name, parameter, part) in [
+            ("stiffness.shear", "stiffness", Part::Kind(ConstraintKind::Shear)),
+            ("bending.12", "bending", Part::Block(12)),
+            ("friction.12", "friction", Part::Collider(12)),
+        ] {
+            let action = action_for(name, FoxgloveValue::Float64(0.5));
+            assert_eq!(action, Ok(Action::set(parameter, 0.5).for_part(part)));
+        }
     }
 
     #[test]
@@ -225,7 +197,7 @@ mod tests {
             "stiffness.silk",
             "stiffness.",
         ] {
-            assert_eq!(command_for(name, number()), Err(Reason::UnknownParameter), "{name}");
+            assert_eq!(action_for(name, number()), Err(Reason::UnknownParameter), "{name}");
         }
         let word = |word: &str| FoxgloveValue::String(word.to_owned());
         for (name, value) in [
@@ -236,9 +208,9 @@ mod tests {
             ("stiffness", word(OWN_OF_EACH)),
             ("damping", FoxgloveValue::Bool(true)),
         ] {
-            assert_eq!(command_for(name, value), Err(Reason::OutOfRange), "{name}");
+            assert_eq!(action_for(name, value), Err(Reason::OutOfRange), "{name}");
         }
         let absent = NamedValue { name: "damping".to_owned(), r#type: None, value: None };
-        assert_eq!(command(&absent), Err(Reason::OutOfRange));
+        assert_eq!(action(&absent), Err(Reason::OutOfRange));
     }
 }

@@ -3,7 +3,10 @@
 
 use foxglove::websocket::{PlaybackCommand, PlaybackControlRequest, PlaybackState, PlaybackStatus};
 
-use crate::message::{Command, Playback, check};
+use sim_contract::{Action, Parameter};
+
+use crate::limits::REPLAY_RATES;
+use crate::message::{CommandKind, Playback};
 use crate::source::recording_times::RecordingTimes;
 
 /// Translates a request into commands, in order. Leaves out what is so already.
@@ -11,15 +14,16 @@ pub(super) fn commands(
     times: &RecordingTimes,
     request: &PlaybackControlRequest,
     now: Option<Playback>,
-) -> Vec<Command> {
-    let seek = request.seek_time.map(|time_ns| Command::Seek { step: times.step_at(time_ns) });
+) -> Vec<CommandKind> {
+    let seek = request.seek_time.map(|time_ns| CommandKind::Seek { step: times.step_at(time_ns) });
     let rate = request.playback_speed;
-    let rate = (now.map(|now| now.rate) != Some(rate)).then_some(Command::Rate { value: rate });
-    let is_playing = request.playback_command == PlaybackCommand::Play;
-    let pace = if is_playing { Command::Resume {} } else { Command::Pause {} };
-    let pace = (now.map(|now| now.is_playing) != Some(is_playing)).then_some(pace);
     // A speed out of range is ignored; the next state shows the real one.
-    [seek, rate, pace].into_iter().flatten().filter(|command| check(command).is_ok()).collect()
+    let is_new = now.map(|now| now.rate) != Some(rate) && REPLAY_RATES.contains(&rate);
+    let rate = is_new.then(|| Action::set(Parameter::TimeScale.name(), rate).into());
+    let is_playing = request.playback_command == PlaybackCommand::Play;
+    let pace = if is_playing { Action::Resume } else { Action::Pause };
+    let pace = (now.map(|now| now.is_playing) != Some(is_playing)).then(|| pace.into());
+    [seek, rate, pace].into_iter().flatten().collect()
 }
 
 /// Answers a request with the requested state. The source's state follows.
@@ -96,15 +100,15 @@ mod tests {
         let now = Some(playback(60));
         let ask = |request| commands(&TIMES, &request, now);
         assert_eq!(ask(request(PlaybackCommand::Pause, 1.0, None)), []);
-        assert_eq!(ask(request(PlaybackCommand::Play, 1.0, None)), [Command::Resume {}]);
+        assert_eq!(ask(request(PlaybackCommand::Play, 1.0, None)), [Action::Resume.into()]);
         let all = ask(request(PlaybackCommand::Play, 2.0, Some(6 * SECOND_NS)));
-        let seek = Command::Seek { step: 240 };
-        assert_eq!(all, [seek, Command::Rate { value: 2.0 }, Command::Resume {}]);
+        let rate = |value: f32| CommandKind::from(Action::set("time_scale", value));
+        assert_eq!(all, [CommandKind::Seek { step: 240 }, rate(2.0), Action::Resume.into()]);
         for speed in [f32::NAN, f32::INFINITY, -1.0, 0.0, 11.0] {
             assert_eq!(ask(request(PlaybackCommand::Pause, speed, None)), [], "{speed}");
         }
         let unknown = commands(&TIMES, &request(PlaybackCommand::Pause, 1.0, None), None);
-        assert_eq!(unknown, [Command::Rate { value: 1.0 }, Command::Pause {}]);
+        assert_eq!(unknown, [rate(1.0), Action::Pause.into()]);
     }
 
     #[test]

@@ -13,10 +13,10 @@ use foxglove::websocket::{
     PlaybackState, SetParametersResponder, Status as LibraryStatus,
 };
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
-use sim_contract::{Parameter as Name, ParameterValues, Reason};
+use sim_contract::{Action, Parameter as Name, ParameterValues, Reason};
 
-use super::{parameters, playback, published_command};
-use crate::message::{Command, OutcomeText, Playback, Refusal, Status, check};
+use super::{parameters, playback};
+use crate::message::{Command, OutcomeText, Playback, Refusal, Status, parse_published};
 use crate::request::{ClientId, RequestKind, RequestSender};
 use crate::source::recording_times::RecordingTimes;
 
@@ -52,8 +52,6 @@ struct BridgeState {
     next_complaint_ns: BTreeMap<u32, u64>,
     parameters: Option<ParameterValues>,
     playback: Option<Playback>,
-    /// Number of the load on show.
-    epoch: u32,
 }
 
 /// The receiver of an outcome.
@@ -104,11 +102,6 @@ impl RequestBridge {
         self.library().take()
     }
 
-    /// Sets the number of the load on show.
-    pub(super) fn set_epoch(&self, epoch: u32) {
-        self.state().epoch = epoch;
-    }
-
     /// Sets the present parameters and sends the changes to the clients that follow them.
     pub(super) fn set_parameters(&self, new: Option<ParameterValues>) {
         let old = std::mem::replace(&mut self.state().parameters, new.clone());
@@ -140,9 +133,9 @@ impl RequestBridge {
     ) -> Option<PlaybackState> {
         let times = self.recording?;
         let playback = self.state().playback;
-        for command in playback::commands(&times, request, playback) {
+        for kind in playback::commands(&times, request, playback) {
             // A client whose request is lost sees the playback state that follows.
-            let _sent = self.requests.send(ANY_CLIENT, RequestKind::Command { id: None, command });
+            let _sent = self.requests.send(ANY_CLIENT, RequestKind::Command(Command::new(kind)));
         }
         Some(playback::requested_state(&times, request, playback))
     }
@@ -155,19 +148,18 @@ impl RequestBridge {
     }
 
     /// Calls a service. The answer is the outcome.
-    pub(super) fn call(&self, client: LibraryClientId, command: Command, responder: Responder) {
+    pub(super) fn call(&self, client: LibraryClientId, action: Action, responder: Responder) {
         let client = ClientId::FoxgloveCaller(client.into());
-        self.submit(client, command, Waiting::Service(responder));
+        self.submit(client, action, Waiting::Service(responder));
     }
 
     /// Handles a command that a client published.
     pub(super) fn accept_published(&self, client: Client, payload: &[u8]) {
-        let epoch = self.state().epoch;
-        match published_command::parse(payload, epoch) {
-            Ok(command) => {
+        match parse_published(payload) {
+            Ok(action) => {
                 self.state().publishers.insert(client.id().into());
                 let sender = ClientId::FoxglovePublisher(client.id().into());
-                self.submit(sender, command, Waiting::Publisher(client));
+                self.submit(sender, action, Waiting::Publisher(client));
             }
             Err(error) => self.complain(&client, format!("not a command: {error}")),
         }
@@ -211,9 +203,9 @@ impl RequestBridge {
         let sender = ClientId::FoxgloveCaller(client.id().into());
         let request = self.open_request(client, parameters.len(), responder);
         for parameter in parameters {
-            match parameters::command(&parameter) {
-                Ok(command) => {
-                    self.submit(sender, command, Waiting::Parameter { request, parameter });
+            match parameters::action(&parameter) {
+                Ok(action) => {
+                    self.submit(sender, action, Waiting::Parameter { request, parameter });
                 }
                 Err(reason) => {
                     let refused = refused_set(&parameter.name, reason);
@@ -238,8 +230,8 @@ impl RequestBridge {
         number
     }
 
-    /// Sends a command to the source, or refuses it.
-    fn submit(&self, client: ClientId, command: Command, waiting: Waiting) {
+    /// Sends an action to the source, or refuses it.
+    fn submit(&self, client: ClientId, action: Action, waiting: Waiting) {
         let id = {
             let mut state = self.state();
             state.last_command = state.last_command.wrapping_add(1);
@@ -247,13 +239,12 @@ impl RequestBridge {
             state.waiting.insert(id, waiting);
             id
         };
-        let kind = command.name();
-        let submitted = check(&command).map_err(Refusal::from).and_then(|()| {
-            let request = RequestKind::Command { id: Some(id), command };
-            self.requests.send(client, request).map_err(|_| Refusal::Busy)
+        let command = Command { id: Some(id), ..Command::new(action) };
+        let submitted = command.kind.check().map_err(Refusal::from).and_then(|()| {
+            self.requests.send(client, RequestKind::Command(command)).map_err(|_| Refusal::Busy)
         });
         if let Err(reason) = submitted {
-            self.answer(&OutcomeText::refused(Some(id), kind, reason));
+            self.answer(&OutcomeText::refused(Some(id), action.kind_name(), reason));
         }
     }
 

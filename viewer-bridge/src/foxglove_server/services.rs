@@ -5,10 +5,10 @@ use std::sync::Arc;
 use foxglove::Schema;
 use foxglove::websocket::service::{Handler, Request, Responder, Service, ServiceSchema};
 use serde::Deserialize;
+use sim_contract::Action;
 
 use super::request_bridge::RequestBridge;
 use crate::limits::STEPS_AT_ONCE_MAX;
-use crate::message::Command;
 
 /// Names of the services: those of the commands.
 const NAMES: [&str; 4] = ["pause", "resume", "step", "reset"];
@@ -40,7 +40,7 @@ struct ServiceHandler(Arc<RequestBridge>);
 impl Handler for ServiceHandler {
     fn call(&self, request: Request, responder: Responder) {
         match parse(request.service_name(), request.payload()) {
-            Ok(command) => self.0.call(request.client_id(), command, responder),
+            Ok(action) => self.0.call(request.client_id(), action, responder),
             Err(error) => responder.respond_err(error),
         }
     }
@@ -55,11 +55,9 @@ struct StepRequest {
 }
 
 impl StepRequest {
-    /// Only forwards, as the schema says: a page may step back in a recording, but no live node can.
-    fn command(&self) -> Result<Command, String> {
-        let range = 1..=i64::from(STEPS_AT_ONCE_MAX);
-        match i32::try_from(self.count) {
-            Ok(count) if range.contains(&self.count) => Ok(Command::Step { count }),
+    fn action(&self) -> Result<Action, String> {
+        match u32::try_from(self.count) {
+            Ok(count @ 1..=STEPS_AT_ONCE_MAX) => Ok(Action::Step { count }),
             _ => Err(format!("step: count accepts an integer from 1 to {STEPS_AT_ONCE_MAX}")),
         }
     }
@@ -74,18 +72,18 @@ fn one() -> i64 {
 }
 
 /// Parses the request of a call. An empty request has the defaults.
-fn parse(name: &str, payload: &[u8]) -> Result<Command, String> {
+fn parse(name: &str, payload: &[u8]) -> Result<Action, String> {
     let payload = if payload.is_empty() { b"{}" } else { payload };
     if name == "step" {
         let request: StepRequest =
             serde_json::from_slice(payload).map_err(|error| malformed(&error))?;
-        return request.command();
+        return request.action();
     }
     let EmptyRequest {} = serde_json::from_slice(payload).map_err(|error| malformed(&error))?;
     match name {
-        "pause" => Ok(Command::Pause {}),
-        "resume" => Ok(Command::Resume {}),
-        "reset" => Ok(Command::Reset {}),
+        "pause" => Ok(Action::Pause),
+        "resume" => Ok(Action::Resume),
+        "reset" => Ok(Action::Reset),
         _ => Err("no such service".to_owned()),
     }
 }
@@ -99,12 +97,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_service_has_a_command() {
+    fn every_service_has_an_action() {
         for name in NAMES {
-            assert_eq!(parse(name, b"").map(|command| command.name()), Ok(name));
+            assert_eq!(parse(name, b"").map(|action| action.kind_name()), Ok(name));
             assert!(parse(name, br#"{"colour":1}"#).is_err(), "{name}");
         }
-        assert_eq!(parse("step", br#"{"count":5}"#), Ok(Command::Step { count: 5 }));
+        assert_eq!(parse("step", br#"{"count":5}"#), Ok(Action::Step { count: 5 }));
         assert!(parse("step", br#"{"count":1.5}"#).is_err());
     }
 

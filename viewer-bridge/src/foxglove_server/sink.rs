@@ -43,10 +43,7 @@ impl Sink for FoxgloveSink {
 
     fn publish(&self, update: &Update<'_>) {
         match *update {
-            Update::Load(scene) => {
-                self.bridge.set_epoch(scene.stamp.epoch);
-                self.publisher.begin_load(scene);
-            }
+            Update::Load(scene) => self.publisher.begin_load(scene),
             Update::Topology(topology) => self.publisher.publish_topology(&topology),
             Update::Colliders(colliders) => self.publisher.publish_colliders(colliders),
             Update::Torn(torn) => self.publisher.publish_torn(&torn),

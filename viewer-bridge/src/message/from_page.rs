@@ -1,18 +1,15 @@
 //! Messages from a page to the server.
 
-use serde::de::DeserializeOwned;
-use serde::{Deserialize, Serialize};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::{Map, Value};
-use sim_contract::{GRAB_OVER_S_DEFAULT, KindFilter, ParameterValue};
-use thiserror::Error;
 
-use super::body_drive::{BodyDrive, no_rotation};
-use super::object::ObjectKind;
-use super::timeline::Toward;
+use super::command::{Command, Malformed};
 use crate::limits::PARTICLES_INSPECTED_MAX;
 
-/// A message from a page.
-#[derive(Debug, Clone, PartialEq)]
+/// A message from a page. A command has a `kind`, and every other message a `type`.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
 pub enum FromPage {
     /// The first message.
     Hello(Hello),
@@ -21,15 +18,25 @@ pub enum FromPage {
         /// Number of the frame.
         frame: u32,
     },
-    /// The page wants to know more, or less, of each frame.
-    Wish(Wish),
-    /// A command.
-    Command {
-        /// The page's number for the command. A command with a number is always answered.
-        id: Option<u32>,
-        /// The command.
-        command: Command,
+    /// Subscribes to the forces of each step, or no longer.
+    Forces {
+        /// `true` if the page wants them.
+        is_on: bool,
     },
+    /// Subscribes to the speeds of all particles, or no longer.
+    Speeds {
+        /// `true` if the page wants them.
+        is_on: bool,
+    },
+    /// Subscribes to the exact states of these particles, and of no others.
+    Inspect {
+        /// Indices; at most [`PARTICLES_INSPECTED_MAX`].
+        #[serde(deserialize_with = "inspected")]
+        particles: Vec<u32>,
+    },
+    /// A command.
+    #[serde(skip)]
+    Command(Command),
 }
 
 /// The first message of a page.
@@ -49,27 +56,6 @@ pub struct Hello {
     pub parts: bool,
 }
 
-/// A wish of a page: values of each frame besides the positions, from now on.
-#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
-#[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
-pub enum Wish {
-    /// The forces of the step, or no longer.
-    Forces {
-        /// `true` if it wants them.
-        is_on: bool,
-    },
-    /// The speeds of all particles, or no longer.
-    Speeds {
-        /// `true` if it wants them.
-        is_on: bool,
-    },
-    /// The exact states of these particles, and of no others.
-    Inspect {
-        /// Indices; at most [`PARTICLES_INSPECTED_MAX`].
-        particles: Vec<u32>,
-    },
-}
-
 /// Format of positions.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -81,221 +67,6 @@ pub enum Choice {
     F32,
     /// 65,536 steps across the bounding box.
     U16,
-}
-
-/// A command of a client.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
-#[allow(missing_docs, reason = "PROTOCOL.md describes every field with its unit and range")]
-pub enum Command {
-    Grab {
-        particle: u32,
-        target: [f32; 3],
-        #[serde(default = "over_s_default")]
-        over_s: f32,
-    },
-    Move {
-        particle: u32,
-        target: [f32; 3],
-        #[serde(default = "over_s_default")]
-        over_s: f32,
-    },
-    Release {
-        particle: u32,
-    },
-    Brush {
-        eye: [f32; 3],
-        ray: [f32; 3],
-        radius: f32,
-        delta: [f32; 3],
-        over_s: f32,
-        #[serde(default)]
-        cap: Option<f32>,
-        #[serde(default)]
-        stroke: Option<u32>,
-    },
-    Push {
-        center: [f32; 3],
-        radius: f32,
-        delta: [f32; 3],
-        #[serde(default)]
-        limit: Option<f32>,
-    },
-    Pin {
-        particle: u32,
-    },
-    Unpin {
-        particle: u32,
-    },
-    Cut {
-        epoch: u32,
-        constraints: Vec<u32>,
-        #[serde(default)]
-        stroke: Option<u32>,
-    },
-    CutSegment {
-        from: [f32; 3],
-        to: [f32; 3],
-        direction: [f32; 3],
-    },
-    CutRadius {
-        center: [f32; 3],
-        radius: f32,
-    },
-    MoveCollider {
-        collider: u32,
-        translation: [f32; 3],
-        #[serde(default = "no_rotation")]
-        rotation: [f32; 4],
-        #[serde(default)]
-        over_s: f32,
-    },
-    DriveBody(BodyDrive),
-    MoveAnchor {
-        anchor: u32,
-        translation: [f32; 3],
-        #[serde(default = "no_rotation")]
-        rotation: [f32; 4],
-        #[serde(default)]
-        over_s: f32,
-    },
-    Lift {
-        epoch: u32,
-        object: ObjectKind,
-        index: u32,
-    },
-    Carry {
-        object: ObjectKind,
-        index: u32,
-        offset: [f32; 3],
-        #[serde(default = "over_s_default")]
-        over_s: f32,
-    },
-    Throw {
-        object: ObjectKind,
-        index: u32,
-        velocity: [f32; 3],
-    },
-    Pause {},
-    Resume {},
-    Step {
-        #[serde(default = "one")]
-        count: i32,
-    },
-    Reset {},
-    Load {
-        scene: String,
-    },
-    Set {
-        parameter: String,
-        value: ParameterValue,
-        #[serde(default)]
-        constraint_kind: Option<KindFilter>,
-        #[serde(default)]
-        block: Option<u32>,
-        #[serde(default)]
-        collider: Option<u32>,
-        /// Changes with the same number are undone together.
-        #[serde(default)]
-        stroke: Option<u32>,
-    },
-    Mark {
-        text: String,
-    },
-    Look {
-        step: u64,
-        #[serde(default)]
-        toward: Toward,
-    },
-    Rewind {
-        to_step: u64,
-    },
-    Undo {
-        #[serde(default)]
-        takes_others: bool,
-    },
-    Record {},
-    StopRecording {},
-    Seek {
-        step: u64,
-    },
-    Rate {
-        value: f32,
-    },
-    Ghost {
-        /// Name of a recording; `None` for no ghost.
-        #[serde(default)]
-        name: Option<String>,
-    },
-    Loop {
-        is_on: bool,
-        /// First step of the loop; without it, that of the recording.
-        #[serde(default)]
-        first_step: Option<u64>,
-        /// Last step of the loop; without it, that of the recording.
-        #[serde(default)]
-        last_step: Option<u64>,
-    },
-}
-
-fn over_s_default() -> f32 {
-    GRAB_OVER_S_DEFAULT
-}
-
-fn one() -> i32 {
-    1
-}
-
-impl Command {
-    /// Type in messages.
-    pub fn name(&self) -> &'static str {
-        match self {
-            Self::Grab { .. } => "grab",
-            Self::Move { .. } => "move",
-            Self::Release { .. } => "release",
-            Self::Brush { .. } => "brush",
-            Self::Push { .. } => "push",
-            Self::Pin { .. } => "pin",
-            Self::Unpin { .. } => "unpin",
-            Self::Cut { .. } => "cut",
-            Self::CutSegment { .. } => "cut_segment",
-            Self::CutRadius { .. } => "cut_radius",
-            Self::MoveCollider { .. } => "move_collider",
-            Self::DriveBody(_) => "drive_body",
-            Self::MoveAnchor { .. } => "move_anchor",
-            Self::Lift { .. } => "lift",
-            Self::Carry { .. } => "carry",
-            Self::Throw { .. } => "throw",
-            Self::Pause {} => "pause",
-            Self::Resume {} => "resume",
-            Self::Step { .. } => "step",
-            Self::Reset {} => "reset",
-            Self::Load { .. } => "load",
-            Self::Mark { .. } => "mark",
-            Self::Look { .. } => "look",
-            Self::Rewind { .. } => "rewind",
-            Self::Undo { .. } => "undo",
-            Self::Set { .. } => "set",
-            Self::Record {} => "record",
-            Self::StopRecording {} => "stop_recording",
-            Self::Seek { .. } => "seek",
-            Self::Rate { .. } => "rate",
-            Self::Ghost { .. } => "ghost",
-            Self::Loop { .. } => "loop",
-        }
-    }
-}
-
-/// The reason for which a text is not a message. The server closes the connection then: the page
-/// is broken, or not ours.
-#[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[error("{0}")]
-pub struct Malformed(String);
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Ack {
-    frame: u32,
 }
 
 impl FromPage {
@@ -311,50 +82,33 @@ impl FromPage {
     /// Parses a message.
     ///
     /// # Errors
-    /// The text is not a JSON object, its type is unknown, or a field is missing, unknown or of the
+    /// The text is not a JSON object, its type or kind is unknown, or a field is missing, unknown or of the
     /// wrong type.
     pub fn parse(text: &str) -> Result<Self, Malformed> {
-        let mut fields: Map<String, Value> = read(text)?;
-        match fields.get("type").and_then(Value::as_str) {
-            Some("hello") => untagged(fields).map(Self::Hello),
-            Some("ack") => untagged(fields).map(|Ack { frame }| Self::Ack { frame }),
-            Some("forces" | "speeds" | "inspect") => read_wish(fields).map(Self::Wish),
-            _ => {
-                let id = fields.remove("id").map(from_value).transpose()?;
-                Ok(Self::Command { id, command: from_value(Value::Object(fields))? })
-            }
+        let fields: Map<String, Value> = serde_json::from_str(text)?;
+        if fields.contains_key("kind") {
+            return Command::read(fields).map(Self::Command);
         }
+        Ok(Self::deserialize(Value::Object(fields))?)
     }
 }
 
-fn untagged<T: DeserializeOwned>(mut fields: Map<String, Value>) -> Result<T, Malformed> {
-    fields.remove("type");
-    from_value(Value::Object(fields))
-}
-
-fn read_wish(fields: Map<String, Value>) -> Result<Wish, Malformed> {
-    let wish = from_value(Value::Object(fields))?;
-    match &wish {
-        Wish::Inspect { particles } if particles.len() > PARTICLES_INSPECTED_MAX => {
-            let count = particles.len();
-            Err(Malformed(format!(
-                "inspect names {count} particles; the limit is {PARTICLES_INSPECTED_MAX}"
-            )))
-        }
-        _ => Ok(wish),
+/// Reads the indices of inspected particles.
+fn inspected<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<u32>, D::Error> {
+    let particles = Vec::deserialize(deserializer)?;
+    if particles.len() <= PARTICLES_INSPECTED_MAX {
+        return Ok(particles);
     }
-}
-
-fn read<T: DeserializeOwned>(text: &str) -> Result<T, Malformed> {
-    serde_json::from_str(text).map_err(|error| Malformed(error.to_string()))
-}
-
-fn from_value<T: DeserializeOwned>(value: Value) -> Result<T, Malformed> {
-    serde_json::from_value(value).map_err(|error| Malformed(error.to_string()))
+    let count = particles.len();
+    Err(D::Error::custom(format!(
+        "inspect names {count} particles; the limit is {PARTICLES_INSPECTED_MAX}"
+    )))
 }
 
 #[cfg(test)]
 mod tests {
+    use sim_contract::{Action, ParameterValue};
+
     use super::*;
 
     #[test]
@@ -366,13 +120,21 @@ mod tests {
             "null",
             "{}",
             r#"{"type":"dance"}"#,
-            r#"{"type":"pause","why":1}"#,
-            r#"{"type":"pin"}"#,
-            r#"{"type":"pin","particle":-1}"#,
-            r#"{"type":"pin","particle":1.5}"#,
-            r#"{"type":"pin","particle":4294967296}"#,
-            r#"{"type":"pin","particle":1,"id":-1}"#,
-            r#"{"type":"pin","particle":1,"id":"a"}"#,
+            r#"{"type":"pause"}"#,
+            r#"{"type":"command"}"#,
+            r#"{"kind":"dance"}"#,
+            r#"{"kind":"action"}"#,
+            r#"{"kind":7}"#,
+            r#"{"kind":"hello","protocol":1}"#,
+            r#"{"type":"ack","kind":"pause","frame":1}"#,
+            r#"{"kind":"pause","why":1}"#,
+            r#"{"kind":"pin"}"#,
+            r#"{"kind":"pin","particle":-1}"#,
+            r#"{"kind":"pin","particle":1.5}"#,
+            r#"{"kind":"pin","particle":4294967296}"#,
+            r#"{"kind":"pin","particle":1,"id":-1}"#,
+            r#"{"kind":"pin","particle":1,"id":"a"}"#,
+            r#"{"kind":"pin","particle":1,"stroke":null}"#,
             r#"{"type":"ack","frame":1,"id":1}"#,
             r#"{"type":"forces"}"#,
             r#"{"type":"forces","is_on":1}"#,
@@ -383,9 +145,11 @@ mod tests {
             r#"{"type":"hello"}"#,
             r#"{"type":"hello","protocol":1,"colour":2}"#,
             r#"{"type":"hello","protocol":1,"format":"f64"}"#,
-            r#"{"type":"grab","particle":1,"target":[0,0]}"#,
-            r#"{"type":"grab","particle":1,"target":[0,0,"nan"]}"#,
-            r#"{"type":"set","parameter":"damping","value":true}"#,
+            r#"{"kind":"grab","particle":1,"target":[0,0]}"#,
+            r#"{"kind":"grab","particle":1,"target":[0,0,"much"]}"#,
+            r#"{"kind":"carry","object":"anchor","index":0,"offset":[0,0,"nan"]}"#,
+            r#"{"kind":"brush","eye":[0,0,1],"ray":[0,0,1],"radius":1,"delta":[0,0,0],"over_s":0.1,"colour":2}"#,
+            r#"{"kind":"set","parameter":"damping","value":true}"#,
         ] {
             assert!(FromPage::parse(text).is_err(), "{text}");
         }
@@ -396,26 +160,17 @@ mod tests {
         let hello = Hello { protocol: 1, token: None, format: Choice::Auto, parts: false };
         let text = r#"{"type":"hello","protocol":1}"#;
         assert_eq!(FromPage::parse(text), Ok(FromPage::Hello(hello)));
-        let command = Command::Step { count: 1 };
-        let text = r#"{"type":"step"}"#;
-        assert_eq!(FromPage::parse(text), Ok(FromPage::Command { id: None, command }));
-        let command = Command::Move { particle: 3, target: [0.0; 3], over_s: 1.0 / 60.0 };
-        let text = r#"{"id":4,"type":"move","particle":3,"target":[0,0,0]}"#;
-        assert_eq!(FromPage::parse(text), Ok(FromPage::Command { id: Some(4), command }));
+        let action = Action::Move { particle: 3, target: [0.0; 3], over_s: 1.0 / 60.0 };
+        let command = Command { id: Some(4), stroke: Some(5), kind: action.into() };
+        let text = r#"{"id":4,"kind":"move","particle":3,"target":[0,0,0],"stroke":5}"#;
+        assert_eq!(FromPage::parse(text), Ok(FromPage::Command(command)));
     }
 
     #[test]
     fn null_switches_a_parameter_off_but_a_missing_value_is_malformed() {
-        let text = r#"{"type":"set","parameter":"tear_force","value":null}"#;
-        let command = Command::Set {
-            parameter: "tear_force".to_owned(),
-            value: ParameterValue::Off,
-            constraint_kind: None,
-            block: None,
-            collider: None,
-            stroke: None,
-        };
-        assert_eq!(FromPage::parse(text), Ok(FromPage::Command { id: None, command }));
-        assert!(FromPage::parse(r#"{"type":"set","parameter":"tear_force"}"#).is_err());
+        let text = r#"{"kind":"set","parameter":"tear_force","value":null}"#;
+        let command = Command::new(Action::set("tear_force", ParameterValue::Off));
+        assert_eq!(FromPage::parse(text), Ok(FromPage::Command(command)));
+        assert!(FromPage::parse(r#"{"kind":"set","parameter":"tear_force"}"#).is_err());
     }
 }

@@ -7,13 +7,13 @@ use bytes::Bytes;
 use tokio::sync::{Semaphore, SemaphorePermit};
 use tokio::time::timeout;
 
-use super::connection::{Acknowledged, Connection, NextFrame};
+use super::connection::{Acknowledged, Connection, NextFrame, Wishes};
 use super::history::PastMessages;
 use super::hub::Hub;
 use super::recordings::Recordings;
 use super::replays::{HeldReplay, Replays};
 use crate::limits::{HELLO_TIMEOUT, PROTOCOL};
-use crate::message::{Command, FromPage, Hello, OutcomeText, Refusal, ToPage, Wish, check};
+use crate::message::{Command, CommandKind, FromPage, Hello, OutcomeText, Refusal, ToPage};
 use crate::request::{ClientId, RequestKind};
 use crate::shutdown::Shutdown;
 use crate::socket::guard::Guard;
@@ -232,7 +232,7 @@ async fn show_past(
             send_queue(peer, connection).await?;
             let state_step = Some(past.step);
             send_all(peer, past.messages).await?;
-            OutcomeText { applied: 1, state_step, ..OutcomeText::pending(id, kind) }
+            OutcomeText { state_step, ..OutcomeText::applied(id, kind) }
         }
     };
     peer.send(Message::Text(ToPage::Outcome(answer).to_json().into())).await
@@ -252,42 +252,44 @@ async fn accept(
                 hub.request(connection.client, RequestKind::Credit);
             }
         }
-        FromPage::Wish(wish) => {
-            connection.with_wishes(|wishes| match wish {
-                Wish::Forces { is_on } => wishes.forces = is_on,
-                Wish::Speeds { is_on } => wishes.speeds = is_on,
-                Wish::Inspect { particles } => wishes.particles = particles,
-            });
-            // The page has not received this part of the state on show.
-            hub.request(connection.client, RequestKind::State);
+        FromPage::Forces { is_on } => subscribe(hub, connection, |wishes| wishes.forces = is_on),
+        FromPage::Speeds { is_on } => subscribe(hub, connection, |wishes| wishes.speeds = is_on),
+        FromPage::Inspect { particles } => {
+            subscribe(hub, connection, |wishes| wishes.particles = particles);
         }
-        FromPage::Command { id, command: Command::Look { step, toward } } => {
-            let sought = hub.look(connection, step, toward);
-            return show_past(peer, connection, id, sought).await;
-        }
-        FromPage::Command {
-            id,
-            command: command @ (Command::Record {} | Command::StopRecording {}),
-        } => {
-            control_recording(venue, connection.client, id, &command);
-        }
-        FromPage::Command { id, command } => submit(hub, connection.client, id, command),
+        FromPage::Command(command) => match command.kind {
+            CommandKind::Look { step, toward } => {
+                let sought = hub.look(connection, step, toward);
+                return show_past(peer, connection, command.id, sought).await;
+            }
+            CommandKind::Record {} | CommandKind::StopRecording {} => {
+                control_recording(venue, connection.client, &command);
+            }
+            _ => submit(hub, connection.client, command),
+        },
         FromPage::Hello(_) => return Err(End::closed(MALFORMED, "hello was sent twice")),
     }
     Ok(())
 }
 
+/// Changes what a page receives with each frame.
+fn subscribe(hub: &Hub, connection: &Connection, change: impl FnOnce(&mut Wishes)) {
+    connection.with_wishes(change);
+    // The page has not received this part of the state on show.
+    hub.request(connection.client, RequestKind::State);
+}
+
 /// Starts or stops a recording, and answers at once: the state of the recording follows as messages of
 /// their own.
-fn control_recording(venue: &Venue, client: ClientId, id: Option<u32>, command: &Command) {
-    let kind = command.name();
+fn control_recording(venue: &Venue, client: ClientId, command: &Command) {
+    let (id, kind) = (command.id, command.kind.name());
     let result = match &venue.recordings {
         None => Err(Refusal::OnlyLive),
-        Some(recordings) if matches!(command, Command::Record {}) => recordings.start(),
+        Some(recordings) if matches!(command.kind, CommandKind::Record {}) => recordings.start(),
         Some(recordings) => recordings.stop(),
     };
     let answer = match result {
-        Ok(()) => OutcomeText { applied: 1, ..OutcomeText::pending(id, kind) },
+        Ok(()) => OutcomeText::applied(id, kind),
         Err(reason) => OutcomeText::refused(id, kind, reason),
     };
     if id.is_some() || result.is_err() {
@@ -296,11 +298,10 @@ fn control_recording(venue: &Venue, client: ClientId, id: Option<u32>, command: 
 }
 
 /// Checks a command and sends it to the source. Answers it here if it is refused.
-fn submit(hub: &Hub, client: ClientId, id: Option<u32>, command: Command) {
-    let kind = command.name();
-    let submitted = check(&command).map_err(Refusal::from).and_then(|()| {
-        let request = RequestKind::Command { id, command };
-        hub.requests().send(client, request).map_err(|_| Refusal::Busy)
+fn submit(hub: &Hub, client: ClientId, command: Command) {
+    let (id, kind) = (command.id, command.kind.name());
+    let submitted = command.kind.check().map_err(Refusal::from).and_then(|()| {
+        hub.requests().send(client, RequestKind::Command(command)).map_err(|_| Refusal::Busy)
     });
     if let Err(reason) = submitted {
         hub.send(client, &ToPage::Outcome(OutcomeText::refused(id, kind, reason)));

@@ -1,9 +1,7 @@
 //! A live node as a source. It searches for a node, shows it, and searches again when it is gone.
 
 mod actions;
-mod brush;
 mod carrier;
-mod command_context;
 mod dispatch;
 mod link;
 mod newest_state;
@@ -148,8 +146,9 @@ fn refuse_requests(sinks: &Sinks, requests: &Requests) {
         let Some(request) = requests.next(SHUTDOWN_CHECK_PERIOD) else { continue };
         match request.kind {
             RequestKind::State => sinks.publish(&Update::SameState),
-            RequestKind::Command { id, command } => {
-                let outcome = OutcomeText::refused(id, command.name(), Refusal::NoNode);
+            RequestKind::Command(command) => {
+                let kind = command.kind.name();
+                let outcome = OutcomeText::refused(command.id, kind, Refusal::NoNode);
                 sinks.publish(&Update::Answer { client: request.client, outcome: &outcome });
             }
             RequestKind::Credit | RequestKind::Left => {}

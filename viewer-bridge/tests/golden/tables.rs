@@ -4,9 +4,12 @@ use std::fmt::Write;
 use std::fs;
 use std::path::Path;
 
-use sim_contract::{NumberRange, PARAMETERS, ParameterInfo, Parts, Slider, ValueForm};
+use sim_contract::{
+    ACTIONS, ActionInfo, FieldForm, NumberRange, PARAMETERS, ParameterInfo, Parts, Slider,
+    ValueForm,
+};
 
-const HEAD: &str = r#"// Generated from the table of parameters; do not edit. `UPDATE_GOLDEN=1 cargo test -p viewer-bridge golden` rewrites it.
+const HEAD: &str = r#"// Generated from the tables of parameters and actions; do not edit. `UPDATE_GOLDEN=1 cargo test -p viewer-bridge golden` rewrites it.
 
 /**
  * A row of the panel. A "log" slider is logarithmic, and starts with 0 if `hasZero`. `whenOn` is the value
@@ -22,12 +25,45 @@ const HEAD: &str = r#"// Generated from the table of parameters; do not edit. `U
 export const ROWS = [
 "#;
 
+const ACTIONS_HEAD: &str = r#"
+/** @typedef {{ name: string, form: "whole" | "long" | "number" | "vector" | "rotation" | "text" | "value" | "kind", isOptional?: boolean }} Field */
+
+/** The fields of each action that a user can give by hand. @type {Record<string, Field[]>} */
+export const ACTIONS = {
+"#;
+
 fn tables() -> String {
     let mut sliders: Vec<_> =
         PARAMETERS.iter().filter_map(|info| Some((info, info.slider?))).collect();
     sliders.sort_by_key(|(_, slider)| slider.place);
-    let rows = sliders.into_iter().map(|(info, slider)| row(info, &slider));
-    format!("{HEAD}{}];\n", rows.collect::<String>())
+    let rows: String = sliders.into_iter().map(|(info, slider)| row(info, &slider)).collect();
+    let actions: String = ACTIONS.iter().filter_map(action).collect();
+    format!("{HEAD}{rows}];\n{ACTIONS_HEAD}{actions}}};\n")
+}
+
+/// The row of an action. `None` for one with fields that no form has.
+fn action(info: &ActionInfo) -> Option<String> {
+    let mut fields = Vec::new();
+    for field in info.fields {
+        let form = match field.form {
+            FieldForm::Whole => "whole",
+            FieldForm::Long => "long",
+            FieldForm::Number => "number",
+            FieldForm::Vector => "vector",
+            FieldForm::Rotation => "rotation",
+            FieldForm::Text => "text",
+            FieldForm::Value => "value",
+            FieldForm::Kind => "kind",
+            // Pages cannot release the grabs of others.
+            FieldForm::Flag => continue,
+            FieldForm::Object | FieldForm::Contents | FieldForm::Hash | FieldForm::Path => {
+                return None;
+            }
+        };
+        let optional = if field.is_optional { ", isOptional: true" } else { "" };
+        fields.push(format!("{{ name: {:?}, form: {form:?}{optional} }}", field.name));
+    }
+    Some(format!("  {}: [{}],\n", info.name, fields.join(", ")))
 }
 
 fn row(info: &ParameterInfo, slider: &Slider) -> String {

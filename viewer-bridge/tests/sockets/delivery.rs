@@ -73,7 +73,7 @@ fn a_page_on_a_slow_line_receives_a_scene_that_takes_longer_than_any_silence_may
     let scene = Scene { positions: (0..150_000).map(particle).collect(), ..Scene::default() };
     site.shown.begin_load(&site.sinks, scene);
     let mut page = site.silent_page();
-    page.send(r#"{"type":"hello","protocol":2,"parts":true}"#);
+    page.send(r#"{"type":"hello","protocol":3,"parts":true}"#);
     let begin_ns = monotonic_ns();
     let mut bytes = Vec::new();
     loop {
@@ -141,7 +141,7 @@ fn a_page_with_the_newest_frame_does_not_request_another() {
 fn a_page_that_missed_the_newest_frame_requests_it() {
     let mut site = Site::start();
     let mut slow = site.silent_page();
-    slow.send(r#"{"type":"hello","protocol":2,"format":"u16"}"#);
+    slow.send(r#"{"type":"hello","protocol":3,"format":"u16"}"#);
     slow.text_with_type("hello");
     site.begin(1);
     for step in 1..=2 {
@@ -222,7 +222,7 @@ fn each_page_receives_its_requested_format() {
     let mut pages = Vec::new();
     for format in ["auto", "f32", "u16"] {
         let mut page = site.silent_page();
-        page.send(&format!(r#"{{"type":"hello","protocol":2,"format":"{format}"}}"#));
+        page.send(&format!(r#"{{"type":"hello","protocol":3,"format":"{format}"}}"#));
         assert_eq!(page.text()["format"], format);
         pages.push(page);
     }

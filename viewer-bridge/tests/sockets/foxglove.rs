@@ -6,10 +6,12 @@ use std::time::Duration;
 
 use bytemuck::cast_slice;
 use serde_json::{Value, json};
-use sim_contract::{Parameter, ParameterValues, ParticleState, Reason, TearCause, TornConstraint};
+use sim_contract::{
+    Action, Parameter, ParameterValues, ParticleState, Reason, TearCause, TornConstraint,
+};
 use tokio::runtime::Runtime;
 use viewer_bridge::limits::{CLIENTS_MAX, VISITORS_MAX};
-use viewer_bridge::message::{Command, OutcomeText, ParametersText, Playback, Status};
+use viewer_bridge::message::{Command, CommandKind, OutcomeText, ParametersText, Playback, Status};
 use viewer_bridge::request::{ClientId, RequestKind, Requests, requests};
 use viewer_bridge::sink::{Demand, Update};
 use viewer_bridge::source::shown_state::ShownState;
@@ -84,11 +86,11 @@ impl FoxgloveSite {
     }
 
     /// Waits for the next command, and returns it with its client and id. Skips subscriptions.
-    fn command(&self) -> (ClientId, Option<u32>, Command) {
+    fn command(&self) -> (ClientId, Option<u32>, CommandKind) {
         wait_for("a command", || match self.requests.next(Duration::ZERO)? {
             request if request.kind == RequestKind::State => None,
             request => match request.kind {
-                RequestKind::Command { id, command } => Some((request.client, id, command)),
+                RequestKind::Command(Command { id, kind, .. }) => Some((request.client, id, kind)),
                 other => panic!("no command: {other:?}"),
             },
         })
@@ -239,16 +241,16 @@ fn a_service_call_becomes_a_command_and_returns_the_outcome() {
     let step = number("step");
     client.call(step, 1, &json!({ "count": 3 }));
     let (sender, id, command) = site.command();
-    assert_eq!(command, Command::Step { count: 3 });
+    assert_eq!(command, Action::Step { count: 3 }.into());
     site.apply(sender, id, "step");
     let answer = client.response(1);
     assert_eq!((&answer["status"], &answer["step"]), (&json!("applied"), &json!(8)));
     for (name, command) in
-        [("pause", Command::Pause {}), ("resume", Command::Resume {}), ("reset", Command::Reset {})]
+        [("pause", Action::Pause), ("resume", Action::Resume), ("reset", Action::Reset)]
     {
         client.call(number(name), 2, &json!({}));
         let (sender, id, asked) = site.command();
-        assert_eq!(asked, command);
+        assert_eq!(asked, command.into());
         site.reject(sender, id, name, Reason::NoEffectHere);
         let failure = client.text("serviceCallFailure");
         assert_eq!(failure["callId"], 2);
@@ -302,7 +304,7 @@ fn a_client_can_read_set_and_subscribe_to_parameters() {
     let set = json!([{ "name": "damping", "value": 3.5 }, { "name": "dance", "value": 1 }]);
     client.send(&json!({ "op": "setParameters", "parameters": set, "id": "set" }));
     let (sender, id, command) = site.command();
-    assert!(matches!(&command, Command::Set { parameter, .. } if parameter == "damping"));
+    assert_eq!(command, Action::set("damping", 3.5).into());
     site.apply(sender, id, "set");
     assert!(client.text("status")["message"].as_str().unwrap().contains("dance"));
     assert_eq!(parameter(&client.text("parameterValues"), "damping"), json!(3.5));
@@ -318,7 +320,8 @@ fn published_commands_reach_the_source_and_grabs_end_with_the_client() {
     client.advertise(5, "/commands");
     client.publish(5, &grab);
     let (holder, id, command) = site.command();
-    assert_eq!(command, Command::Grab { particle: 3, target: [0.0, 1.0, 2.0], over_s: 0.1 });
+    let expected = Action::Grab { particle: 3, target: [0.0, 1.0, 2.0], over_s: 0.1 };
+    assert_eq!(command, expected.into());
     site.reject(holder, id, "grab", Reason::GrabbedByOther);
     let status = client.text("status");
     assert!(status["message"].as_str().unwrap().contains("another client"), "{status}");
@@ -363,10 +366,10 @@ fn an_invalid_command_is_refused_and_does_not_reach_the_source() {
     client.advertise(2, "/commands");
     client.publish(2, &json!({ "kind": "resume" }));
     let command = wait_for("a command", || match site.requests.next(Duration::ZERO)?.kind {
-        RequestKind::Command { command, .. } => Some(command),
+        RequestKind::Command(command) => Some(command.kind),
         RequestKind::Left | RequestKind::State | RequestKind::Credit => None,
     });
-    assert_eq!(command, Command::Resume {});
+    assert_eq!(command, Action::Resume.into());
 }
 
 #[test]
@@ -488,8 +491,9 @@ fn a_client_can_observe_and_control_playback() {
     assert_eq!(state(&mut client), (1, 5 * second_ns, 1.0, false, String::new()));
     client.play(0, 2.0, Some(6 * second_ns), "seven");
     let commands = [(); 3].map(|()| site.command().2);
-    let seek = Command::Seek { step: 240 };
-    assert_eq!(commands, [seek, Command::Rate { value: 2.0 }, Command::Resume {}]);
+    let rate = Action::set("time_scale", 2.0);
+    let seek = CommandKind::Seek { step: 240 };
+    assert_eq!(commands, [seek, rate.into(), Action::Resume.into()]);
     assert_eq!(state(&mut client), (0, 6 * second_ns, 2.0, true, "seven".to_owned()));
     let ended = Playback { step: 480, rate: 2.0, ..paused };
     site.sinks.publish(&Update::Playback(&ended));

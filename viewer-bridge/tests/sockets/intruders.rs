@@ -65,16 +65,16 @@ fn every_answer_has_the_security_headers() {
 fn check_token(site: &Site) {
     let token = site.url.split_once("#token=").unwrap().1.to_owned();
     for hello in [
-        r#"{"type":"hello","protocol":2}"#.to_owned(),
-        r#"{"type":"hello","protocol":2,"token":"0123456789abcdef0123456789abcdef"}"#.to_owned(),
-        format!(r#"{{"type":"hello","protocol":2,"token":"{}"}}"#, &token[..31]),
+        r#"{"type":"hello","protocol":3}"#.to_owned(),
+        r#"{"type":"hello","protocol":3,"token":"0123456789abcdef0123456789abcdef"}"#.to_owned(),
+        format!(r#"{{"type":"hello","protocol":3,"token":"{}"}}"#, &token[..31]),
     ] {
         let mut page = site.silent_page();
         page.send(&hello);
         assert_eq!(page.close_code(), Some(4401), "{hello}");
     }
     let mut page = site.silent_page();
-    page.send(&format!(r#"{{"type":"hello","protocol":2,"token":"{token}"}}"#));
+    page.send(&format!(r#"{{"type":"hello","protocol":3,"token":"{token}"}}"#));
     assert_eq!(page.text()["type"], "hello");
 }
 

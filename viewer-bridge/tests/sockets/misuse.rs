@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use serde_json::json;
 use tungstenite::Message;
-use viewer_bridge::message::Level;
+use viewer_bridge::message::{Command, Level};
 use viewer_bridge::request::RequestKind;
 use viewer_bridge::sink::Update;
 
@@ -19,7 +19,7 @@ fn a_first_message_other_than_hello_ends_the_connection() {
     for (text, code) in [
         ("", 4400),
         ("hello", 4400),
-        (r#"{"type":"pause"}"#, 4400),
+        (r#"{"kind":"pause"}"#, 4400),
         (r#"{"type":"hello"}"#, 4400),
         (r#"{"type":"hello","protocol":1}"#, 4426),
     ] {
@@ -37,9 +37,11 @@ fn a_malformed_message_ends_the_connection() {
         "{",
         "[]",
         r#"{"type":"dance"}"#,
-        r#"{"type":"pin","particle":1,"colour":2}"#,
-        r#"{"type":"move","particle":1,"target":["nan",0,0]}"#,
-        r#"{"type":"hello","protocol":2}"#,
+        r#"{"kind":"dance"}"#,
+        r#"{"kind":"release","particle":1,"force":true}"#,
+        r#"{"kind":"pin","particle":1,"colour":2}"#,
+        r#"{"kind":"move","particle":1,"target":["much",0,0]}"#,
+        r#"{"type":"hello","protocol":3}"#,
     ] {
         let mut page = site.page();
         page.send(text);
@@ -56,7 +58,7 @@ fn a_message_that_is_too_long_ends_the_connection() {
     let site = Site::start();
     let mut other = site.page();
     let mut page = site.page();
-    let text = format!(r#"{{"type":"load","scene":"{}"}}"#, "x".repeat(64 << 10));
+    let text = format!(r#"{{"kind":"load","scene":"{}"}}"#, "x".repeat(64 << 10));
     // The server may close the connection before all of it is sent.
     let _sent = page.socket.send(Message::text(text));
     let code = page.close_code();
@@ -72,7 +74,7 @@ fn a_flood_ends_the_connection() {
     let mut page = site.page();
     for _ in 0..1000 {
         // The server may have closed the connection already.
-        if page.socket.send(Message::text(r#"{"type":"pause"}"#)).is_err() {
+        if page.socket.send(Message::text(r#"{"kind":"pause"}"#)).is_err() {
             break;
         }
     }
@@ -84,7 +86,7 @@ fn a_flood_ends_the_connection() {
 fn a_value_out_of_range_is_rejected_and_the_page_stays_connected() {
     let site = Site::start();
     let mut page = site.page();
-    page.send(r#"{"type":"grab","particle":1,"target":[0,1e8,0],"id":5}"#);
+    page.send(r#"{"kind":"grab","particle":1,"target":[0,1e8,0],"id":5}"#);
     let outcome = page.text_with_type("outcome");
     assert_eq!(
         outcome,
@@ -94,10 +96,12 @@ fn a_value_out_of_range_is_rejected_and_the_page_stays_connected() {
             "text": "a value is out of its range",
         })
     );
-    page.send(r#"{"type":"pin","particle":1,"id":6}"#);
+    page.send(r#"{"kind":"move","particle":1,"target":["nan",0,0],"id":7}"#);
+    assert_eq!(page.text_with_type("outcome")["reason"], "non_finite");
+    page.send(r#"{"kind":"pin","particle":1,"id":6}"#);
     wait_for("the command", || {
         let request = site.requests.next(Duration::ZERO)?;
-        matches!(request.kind, RequestKind::Command { id: Some(6), .. }).then_some(())
+        matches!(request.kind, RequestKind::Command(Command { id: Some(6), .. })).then_some(())
     });
 }
 

@@ -118,7 +118,7 @@ impl Site {
     /// Opens a socket that has sent `hello`.
     pub(crate) fn greeting_page(&self) -> Page {
         let mut page = self.silent_page();
-        page.send(r#"{"type":"hello","protocol":2}"#);
+        page.send(r#"{"type":"hello","protocol":3}"#);
         page
     }
 

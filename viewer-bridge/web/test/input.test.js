@@ -20,9 +20,9 @@ const shown = (canChange = true) => pageOf(SCENE, canChange);
 test("a reset or another scene ends a grab with a release, and without its last motion", () => {
   for (const change of [(page) => page.receiveText({ type: "reset", step: 2 }), (page) => page.receive({ ...SCENE, epoch: 2 })]) {
     const { input, simulation, sent } = pressed();
-    assert.deepEqual(sent.map(({ type }) => type), ["grab"]);
+    assert.deepEqual(sent.map(({ kind }) => kind), ["grab"]);
     change(simulation);
-    assert.deepEqual(sent.map(({ type, particle }) => [type, particle]), [["grab", 0], ["release", 0]]);
+    assert.deepEqual(sent.map(({ kind, particle }) => [kind, particle]), [["grab", 0], ["release", 0]]);
     assert.equal(input.tool, null);
   }
 });
@@ -36,7 +36,7 @@ test("a lost connection drops the tool without a message", () => {
 test("a motion after a rest is as quick as one without", () => {
   const { input, sent } = pressed();
   const start = input.tool.sentMs;
-  const moves = () => sent.filter(({ type }) => type === "move");
+  const moves = () => sent.filter(({ kind }) => kind === "move");
   input.tick(start + 16);
   // The pointer rests for a second.
   for (let ms = 32; ms <= 1000; ms += 16) input.tick(start + ms);
@@ -71,7 +71,7 @@ test("a click without motion selects and sends nothing, also in a recording", ()
 test("a drag grabs and does not select, and neither does a press that lasts", () => {
   const page = shown();
   click(page, 9);
-  assert.deepEqual(page.sent.map(({ type }) => type).slice(0, 1), ["grab"]);
+  assert.deepEqual(page.sent.map(({ kind }) => kind).slice(0, 1), ["grab"]);
   assert.deepEqual(page.selection.items, []);
   const other = shown();
   other.listeners.get("pointerdown")(other.event);
@@ -79,7 +79,7 @@ test("a drag grabs and does not select, and neither does a press that lasts", ()
   const { pressedMs } = other.input.tool;
   other.input.tick(pressedMs + 250);
   other.listeners.get("pointerup")({ ...other.event, type: "pointerup", timeStamp: pressedMs + 250 });
-  assert.deepEqual(other.sent.map(({ type }) => type), ["grab", "release"]);
+  assert.deepEqual(other.sent.map(({ kind }) => kind), ["grab", "release"]);
   assert.deepEqual(other.selection.items, []);
 });
 
@@ -87,7 +87,7 @@ test("a click in another mode, a second finger and Escape select nothing", () =>
   const page = shown();
   page.input.mode = "pin";
   click(page, 0);
-  assert.deepEqual([page.selection.items, page.sent.map(({ type }) => type)], [[], ["pin"]]);
+  assert.deepEqual([page.selection.items, page.sent.map(({ kind }) => kind)], [[], ["pin"]]);
   page.input.mode = "grab";
   page.listeners.get("pointerdown")(page.event);
   page.listeners.get("pointerdown")({ ...page.event, pointerId: 2 });
@@ -109,7 +109,7 @@ test("a busy page decides by the times of the events, not by those of their arri
   const finger = { ...press.event, pointerType: "touch" };
   press.listeners.get("pointerdown")({ ...finger, timeStamp: finger.timeStamp - 700 });
   press.listeners.get("pointerup")({ ...finger, type: "pointerup" });
-  assert.deepEqual(press.sent.map(({ type }) => type), ["pin"]);
+  assert.deepEqual(press.sent.map(({ kind }) => kind), ["pin"]);
   assert.deepEqual(press.selection.items, []);
   // All events of a throw arrive together.
   const thrown = shown();
@@ -144,7 +144,7 @@ test("a timer that was held up waits for the release behind it", (context) => {
   const long = begin();
   now += 550;
   context.mock.timers.tick(550);
-  assert.deepEqual(long.sent.map(({ type }) => type), ["pin"]);
+  assert.deepEqual(long.sent.map(({ kind }) => kind), ["pin"]);
   long.listeners.get("pointerup")({ ...long.event, pointerType: "touch", type: "pointerup", timeStamp: now + 50 });
   assert.deepEqual(long.selection.items, [], "the release selects nothing");
 });
@@ -153,7 +153,7 @@ test("P pins what is selected, not what lies under the mouse, and unpins it if a
   const page = pageOf(sceneOf([0, 0, 0, 0.4, 0, 0, 0.8, 0, 0]));
   page.listeners.get("pointermove")({ ...page.event, type: "pointermove" });
   page.selection.set([{ kind: "particle", index: 1 }, { kind: "particle", index: 2 }]);
-  const sent = () => page.sent.splice(0).map(({ type, particle }) => [type, particle]);
+  const sent = () => page.sent.splice(0).map(({ kind, particle }) => [kind, particle]);
   page.simulation.expectPin(1, true);
   assert.ok(page.input.pinByKey());
   assert.deepEqual(sent(), [["pin", 2]]);

@@ -25,8 +25,8 @@ test("an outcome goes to its caller, and a refusal also to the user", () => {
   const statuses = [];
   const commands = new Commands((message) => sent.push(message) > 0, (outcome) => refused.push(outcome.reason));
   commands.run("pin", { particle: 3 }, (outcome) => statuses.push(outcome.status));
-  commands.run("cut", { epoch: 1, constraints: [4] }, (outcome) => statuses.push(outcome.status));
-  assert.deepEqual(sent.map(({ type, id }) => [type, id]), [["pin", 1], ["cut", 2]]);
+  commands.run("cut", { constraint: 4 }, (outcome) => statuses.push(outcome.status));
+  assert.deepEqual(sent.map(({ kind, id }) => [kind, id]), [["pin", 1], ["cut", 2]]);
   commands.receive({ id: 2, status: "rejected", reason: "unknown_constraint" });
   commands.receive({ id: 1, status: "applied", reason: "" });
   commands.receive({ id: null, status: "rejected", reason: "not_grabbed" });

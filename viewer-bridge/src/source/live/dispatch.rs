@@ -6,10 +6,9 @@ use std::sync::Arc;
 use sim_contract::clock::monotonic_ns;
 use sim_contract::{Action, Client, Outcome, Reason, RequestError};
 
-use super::actions::actions;
-use super::command_context::CommandContext;
+use super::actions::{CommandContext, actions};
 use crate::limits::{COMMANDS_QUEUED_MAX, GRABS_PER_CLIENT_MAX, OUTCOME_TIMEOUT};
-use crate::message::{Command, OutcomeText, Refusal, Status};
+use crate::message::{Command, CommandKind, OutcomeText, Refusal, Status};
 use crate::request::ClientId;
 use crate::scene::catalog::Catalog;
 use crate::sink::{Sinks, Update};
@@ -87,13 +86,12 @@ impl Dispatch {
     pub(super) fn submit(
         &mut self,
         client: ClientId,
-        id: Option<u32>,
-        command: Command,
+        command: &Command,
         context: CommandContext<'_>,
     ) -> Option<OutcomeText> {
-        let kind = command.name();
-        let parts = self.update_grabs(client, &command);
-        match parts.and_then(|()| actions(command, context, &self.catalog)) {
+        let (id, kind) = (command.id, command.kind.name());
+        let parts = self.update_grabs(client, &command.kind);
+        match parts.and_then(|()| actions(&command.kind, context, &self.catalog)) {
             Err(reason) => Some(OutcomeText::refused(id, kind, reason)),
             Ok(parts) if parts.is_empty() => id.map(|_| OutcomeText::pending(id, kind)),
             Ok(parts) => {
@@ -126,13 +124,14 @@ impl Dispatch {
     }
 
     /// Notes a client's grabs, and refuses to touch those of others.
-    fn update_grabs(&mut self, client: ClientId, command: &Command) -> Result<(), Refusal> {
+    fn update_grabs(&mut self, client: ClientId, kind: &CommandKind) -> Result<(), Refusal> {
         if self.outbox.len() >= COMMANDS_QUEUED_MAX {
             return Err(Refusal::Busy);
         }
         let owner = |particle: &u32| self.grabs.get(particle).map(|grab| grab.client);
-        match command {
-            Command::Grab { particle, .. } => {
+        let CommandKind::Action(action) = kind else { return Ok(()) };
+        match action {
+            Action::Grab { particle, .. } => {
                 if owner(particle).is_some_and(|other| other != client) {
                     return Err(Reason::GrabbedByOther.into());
                 }
@@ -142,13 +141,13 @@ impl Dispatch {
                 }
                 self.grabs.entry(*particle).or_insert(GrabOwner { client, is_applied: false });
             }
-            Command::Move { particle, .. } | Command::Release { particle } => {
+            Action::Move { particle, .. } | Action::Release { particle, .. } => {
                 match owner(particle) {
                     None => return Err(Reason::NotGrabbed.into()),
                     Some(other) if other != client => return Err(Reason::GrabbedByOther.into()),
                     Some(_) => {}
                 }
-                if matches!(command, Command::Release { .. }) {
+                if matches!(action, Action::Release { .. }) {
                     self.grabs.remove(particle);
                 }
             }

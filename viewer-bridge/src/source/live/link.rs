@@ -6,11 +6,12 @@ use std::time::Duration;
 use recording::{StatusRow, StepRow};
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{
-    AttachError, Client, Endpoint, NodeStatus, Parameter, ParameterValues, SnapshotFlags, Tap,
+    Action, AttachError, Client, Endpoint, NodeStatus, Parameter, ParameterValues, SnapshotFlags,
+    Tap,
 };
 
+use super::actions::CommandContext;
 use super::carrier::{Carrier, Place};
-use super::command_context::CommandContext;
 use super::dispatch::Dispatch;
 use super::newest_state::{LoadedState, NewestState};
 use super::node_text::node_text;
@@ -21,7 +22,7 @@ use super::undo::stack::Change;
 use super::undo::{Undo, UndoRequest};
 use super::updates::Updates;
 use crate::limits::{FRAMES_PER_SECOND_MAX, RELEASE_TIMEOUT};
-use crate::message::{Command, Level, Node, OutcomeText, ParametersText, Refusal};
+use crate::message::{Command, CommandKind, Level, Node, OutcomeText, ParametersText, Refusal};
 use crate::request::{ClientId, Request, RequestKind, Requests};
 use crate::scene::catalog::Catalog;
 use crate::sink::{Demand, Sinks, State, Update};
@@ -225,7 +226,14 @@ impl Link {
                 self.carrier.remove_client(client);
                 self.undo.remove_client(client);
             }
-            RequestKind::Command { id, command: Command::Undo { takes_others } } => {
+            RequestKind::Command(command) => self.obey(client, &command, shown, sinks),
+        }
+    }
+
+    fn obey(&mut self, client: ClientId, command: &Command, shown: &ShownState, sinks: &Sinks) {
+        let (id, kind) = (command.id, &command.kind);
+        match *kind {
+            CommandKind::Undo { takes_others } => {
                 let request = UndoRequest { client, id, takes_others };
                 let answer = self.undo.begin(request, self.newest.get(), &mut self.client);
                 match answer {
@@ -235,14 +243,10 @@ impl Link {
                     None => self.carrier.clear(),
                 }
             }
-            RequestKind::Command {
-                id,
-                command:
-                    command @ (Command::Lift { .. } | Command::Carry { .. } | Command::Throw { .. }),
-            } => {
-                let outcome = match self.carry(client, &command, shown) {
-                    Ok(()) => OutcomeText::applied(id, command.name()),
-                    Err(reason) => OutcomeText::refused(id, command.name(), reason),
+            CommandKind::Lift { .. } | CommandKind::Carry { .. } | CommandKind::Throw { .. } => {
+                let outcome = match self.carry(client, command, shown) {
+                    Ok(()) => OutcomeText::applied(id, kind.name()),
+                    Err(reason) => OutcomeText::refused(id, kind.name(), reason),
                 };
                 // A motion that begins does so with the next step.
                 self.move_carried(sinks);
@@ -250,9 +254,7 @@ impl Link {
                     sinks.publish(&Update::Answer { client, outcome: &outcome });
                 }
             }
-            RequestKind::Command { id, command } => {
-                self.submit((client, id), command, shown, sinks);
-            }
+            _ => self.submit(client, command, shown, sinks),
         }
     }
 
@@ -267,9 +269,9 @@ impl Link {
             return Err(Refusal::OnlyLive);
         }
         let state = self.newest.get().ok_or(Refusal::NoNode)?;
-        match *command {
-            Command::Lift { epoch, .. } if epoch != shown.epoch() => Err(Refusal::StaleEpoch),
-            Command::Lift { object, index, .. } => {
+        match command.kind {
+            CommandKind::Lift { epoch, .. } if epoch != shown.epoch() => Err(Refusal::StaleEpoch),
+            CommandKind::Lift { object, index, .. } => {
                 let place = Place { state: &state, colliders: shown.colliders() };
                 let object = object.at(index);
                 self.carrier.lift(client, object, place)?;
@@ -281,11 +283,11 @@ impl Link {
                 self.undo.add_carrying(change, prepared);
                 Ok(())
             }
-            Command::Carry { object, index, offset, over_s } => {
+            CommandKind::Carry { object, index, offset, over_s } => {
                 let steps = f64::from(over_s) * f64::from(state.load.header.rate_hz.max(1));
                 self.carrier.carry(client, object.at(index), offset, steps)
             }
-            Command::Throw { object, index, velocity } => {
+            CommandKind::Throw { object, index, velocity } => {
                 self.carrier.throw(client, object.at(index), velocity)
             }
             _ => Ok(()),
@@ -293,13 +295,7 @@ impl Link {
     }
 
     /// Gives a command to the dispatch. Keeps the state before a change that can be undone.
-    fn submit(
-        &mut self,
-        (client, id): (ClientId, Option<u32>),
-        command: Command,
-        shown: &ShownState,
-        sinks: &Sinks,
-    ) {
+    fn submit(&mut self, client: ClientId, command: &Command, shown: &ShownState, sinks: &Sinks) {
         let state = self.newest.get();
         let context = CommandContext {
             epoch: shown.epoch(),
@@ -309,11 +305,13 @@ impl Link {
             particles: state.map_or(&[], |state| state.particles),
         };
         let known = (&self.keyframes, &*self.catalog);
-        let awaited = state.and_then(|state| self.undo.prepare(client, &command, &state, known));
-        let is_restart =
-            matches!(command, Command::Reset {} | Command::Load { .. } | Command::Rewind { .. });
+        let awaited = state.and_then(|state| self.undo.prepare(client, command, &state, known));
+        let is_restart = matches!(
+            command.kind,
+            CommandKind::Action(Action::Reset | Action::Load { .. } | Action::Rewind { .. })
+        );
         let before = self.dispatch.last_command();
-        if let Some(outcome) = self.dispatch.submit(client, id, command, context) {
+        if let Some(outcome) = self.dispatch.submit(client, command, context) {
             sinks.publish(&Update::Answer { client, outcome: &outcome });
         }
         let number = self.dispatch.last_command();

@@ -16,7 +16,7 @@ use sim_contract::{
 };
 
 use super::link::{Link, LinkEnd};
-use crate::message::{Choice, Command, Mode};
+use crate::message::{Choice, Command, CommandKind, Mode};
 use crate::pages::connection::{Connection, NextFrame};
 use crate::pages::hub::Hub;
 use crate::request::{ClientId, Request, RequestKind, Requests, requests};
@@ -136,8 +136,8 @@ impl Fixture {
         messages.iter().map(|bytes| decode(bytes).unwrap()).collect()
     }
 
-    fn command(&mut self, command: Command) {
-        self.request(RequestKind::Command { id: None, command });
+    fn command(&mut self, kind: impl Into<CommandKind>) {
+        self.request(RequestKind::Command(Command::new(kind)));
     }
 
     fn request(&mut self, kind: RequestKind) {
@@ -194,18 +194,11 @@ impl Sink for RowLog {
     }
 }
 
-fn grab() -> Command {
-    Command::Grab { particle: 1, target: TARGET, over_s: 0.0 }
-}
-
-fn pull() -> Command {
-    Command::Move { particle: 1, target: TARGET, over_s: 0.0 }
-}
-
 fn actions(commands: &[Sent]) -> Vec<Action> {
     commands.iter().map(Sent::action).collect()
 }
 
+const GRAB: Action = Action::Grab { particle: 1, target: TARGET, over_s: 0.0 };
 const MOVE: Action = Action::Move { particle: 1, target: TARGET, over_s: 0.0 };
 const RELEASE: Action = Action::Release { particle: 1, force: false };
 
@@ -275,17 +268,17 @@ fn a_state_of_another_size_is_neither_shown_nor_measured() {
 #[test]
 fn a_grab_that_the_node_applies_after_a_reset_still_belongs_to_the_page() {
     let mut fixture = Fixture::start();
-    fixture.command(grab());
-    fixture.command(pull());
+    fixture.command(GRAB);
+    fixture.command(MOVE);
     let sent = fixture.arrived();
     assert_eq!(sent.len(), 2);
     fixture.reset();
     fixture.read();
-    fixture.command(pull());
+    fixture.command(MOVE);
     assert_eq!(actions(&fixture.arrived()), [MOVE]);
     fixture.answer(sent[0]);
     fixture.read();
-    fixture.command(pull());
+    fixture.command(MOVE);
     assert_eq!(actions(&fixture.arrived()), [MOVE]);
     fixture.request(RequestKind::Left);
     assert_eq!(actions(&fixture.arrived()), [RELEASE]);
@@ -294,12 +287,12 @@ fn a_grab_that_the_node_applies_after_a_reset_still_belongs_to_the_page() {
 #[test]
 fn a_grab_that_the_node_applied_before_a_reset_has_ended() {
     let mut fixture = Fixture::start();
-    fixture.command(grab());
+    fixture.command(GRAB);
     let sent = fixture.arrived();
     fixture.answer(sent[0]);
     fixture.reset();
     fixture.read();
-    fixture.command(pull());
+    fixture.command(MOVE);
     fixture.request(RequestKind::Left);
     assert!(fixture.arrived().is_empty());
 }
@@ -307,12 +300,12 @@ fn a_grab_that_the_node_applied_before_a_reset_has_ended() {
 #[test]
 fn a_grab_that_another_client_has_released_by_force_has_ended() {
     let mut fixture = Fixture::start();
-    fixture.command(grab());
+    fixture.command(GRAB);
     let sent = fixture.arrived();
     fixture.answer(sent[0]);
     fixture.answer(Sent::new(1, 1, Action::Release { particle: 1, force: true }));
     fixture.read();
-    fixture.command(pull());
+    fixture.command(MOVE);
     fixture.request(RequestKind::Left);
     assert!(fixture.arrived().is_empty());
 }
@@ -320,7 +313,7 @@ fn a_grab_that_another_client_has_released_by_force_has_ended() {
 #[test]
 fn a_grab_of_a_page_that_leaves_before_the_reset_is_answered_is_released() {
     let mut fixture = Fixture::start();
-    fixture.command(grab());
+    fixture.command(GRAB);
     fixture.reset();
     fixture.read();
     fixture.request(RequestKind::Left);
@@ -331,15 +324,15 @@ fn a_grab_of_a_page_that_leaves_before_the_reset_is_answered_is_released() {
 #[test]
 fn a_release_waits_for_room_at_the_node_and_is_sent_without_another_request() {
     let mut fixture = Fixture::start();
-    fixture.command(grab());
+    fixture.command(GRAB);
     let sent = fixture.arrived();
     fixture.answer(sent[0]);
     fixture.read();
     for _ in 0..COMMANDS_BUFFERED {
-        fixture.command(pull());
+        fixture.command(MOVE);
     }
-    fixture.command(pull());
-    fixture.command(Command::Release { particle: 1 });
+    fixture.command(MOVE);
+    fixture.command(RELEASE);
     fixture.link.dispatch.expire(&fixture.sinks, u64::MAX);
     assert_eq!(actions(&fixture.arrived()), vec![MOVE; COMMANDS_BUFFERED]);
     while fixture.requests.next(Duration::ZERO).is_some() {}
@@ -352,8 +345,8 @@ fn the_last_answers_and_the_last_status_of_a_run_are_published_before_the_next_r
     let mut fixture = Fixture::start();
     let log = Arc::new(RowLog::default());
     fixture.sinks.add(Arc::<RowLog>::clone(&log));
-    let command = Command::Pin { particle: 1 };
-    fixture.request(RequestKind::Command { id: Some(9), command });
+    let command = Command { id: Some(9), ..Command::new(Action::Pin { particle: 1 }) };
+    fixture.request(RequestKind::Command(command));
     let sent = fixture.arrived();
     fixture.answer(sent[0]);
     let status = |run_id, step| NodeStatus { run_id, step, ..NodeStatus::default() };

@@ -80,7 +80,7 @@ impl Undo {
         state: &LoadedState<'_>,
         (keyframes, catalog): (&Keyframes, &Catalog),
     ) -> Option<Awaited> {
-        let (what, stroke) = undoable(command)?;
+        let (what, stroke) = (undoable(&command.kind)?, command.stroke);
         if !matches!(client, ClientId::Page(_)) {
             return None;
         }

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use recording::{ReadError, TapeError, TapeState};
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
-use sim_contract::{Forces, ForcesHeader, Parameter, Reason};
+use sim_contract::{Action, Forces, ForcesHeader, Parameter, ParameterValue, Reason};
 
 use super::check::Report;
 use super::ghosts::Ghosts;
@@ -14,8 +14,8 @@ use super::playhead::{Advanced, Playhead};
 use super::resets::ResetFinder;
 use super::statistics::statistics;
 use super::texts;
-use crate::limits::FRAMES_PER_SECOND_MAX;
-use crate::message::{Command, Hashes, Level, OutcomeText, ParametersText, Refusal};
+use crate::limits::{FRAMES_PER_SECOND_MAX, REPLAY_RATES};
+use crate::message::{CommandKind, Hashes, Level, OutcomeText, ParametersText, Refusal};
 use crate::request::{ClientId, Request, RequestKind, Requests};
 use crate::sink::{Demand, Sinks, State, Update};
 use crate::source::shown_state::ShownState;
@@ -160,14 +160,15 @@ impl<'a> Player<'a> {
             RequestKind::State => self.on_show = None,
             // A recording has no grabs.
             RequestKind::Credit | RequestKind::Left => {}
-            RequestKind::Command { id, command } => match self.obey(&command)? {
+            RequestKind::Command(command) => match self.obey(&command.kind)? {
                 Ok(()) => {
                     self.is_playback_changed = true;
-                    let outcome = OutcomeText::applied(id, command.name());
+                    let outcome = OutcomeText::applied(command.id, command.kind.name());
                     self.answers.push(Answer { client, outcome });
                 }
                 Err(reason) => {
-                    let outcome = &OutcomeText::refused(id, command.name(), reason);
+                    let name = command.kind.name();
+                    let outcome = &OutcomeText::refused(command.id, name, reason);
                     self.sinks.publish(&Update::Answer { client, outcome });
                 }
             },
@@ -176,35 +177,50 @@ impl<'a> Player<'a> {
     }
 
     /// Obeys a command that controls the playback. A recording cannot be changed.
-    fn obey(&mut self, command: &Command) -> Result<Result<(), Refusal>, ReadError> {
+    fn obey(&mut self, kind: &CommandKind) -> Result<Result<(), Refusal>, ReadError> {
         let now_ns = monotonic_ns();
         let playhead = &mut self.playhead;
-        match command {
-            Command::Pause {} => playhead.pause(now_ns),
-            Command::Resume {} => playhead.resume(now_ns),
-            Command::Rate { value } => playhead.set_rate(*value, now_ns),
-            Command::Loop { is_on: false, .. } => playhead.stop_looping(now_ns),
-            Command::Loop { is_on: true, first_step, last_step } => {
+        match kind {
+            CommandKind::Action(Action::Pause) => playhead.pause(now_ns),
+            CommandKind::Action(Action::Resume) => playhead.resume(now_ns),
+            CommandKind::Action(Action::Set {
+                parameter,
+                value: ParameterValue::Number(rate),
+                ..
+            }) if parameter.as_str() == Parameter::TimeScale.name() => {
+                if !REPLAY_RATES.contains(rate) {
+                    return Ok(Err(Reason::OutOfRange.into()));
+                }
+                playhead.set_rate(*rate, now_ns);
+            }
+            CommandKind::Loop { is_on: false, .. } => playhead.stop_looping(now_ns),
+            CommandKind::Loop { is_on: true, first_step, last_step } => {
                 if !playhead.loop_between(*first_step, *last_step, now_ns) {
                     return Ok(Err(Reason::OutOfRange.into()));
                 }
             }
-            Command::Ghost { name } => {
+            CommandKind::Ghost { name } => {
                 if let Err(refusal) = self.ghosts.choose(name.as_deref(), self.recording) {
                     return Ok(Err(refusal));
                 }
                 self.on_show = None;
                 self.publish_ghost();
             }
-            Command::Seek { step } => {
+            CommandKind::Seek { step } => {
                 let step = self.recording.tape.step_at(*step)?;
                 playhead.go_to(step, now_ns);
             }
-            Command::Step { .. } if playhead.is_playing => {
+            CommandKind::Action(Action::Step { .. }) | CommandKind::StepBack { .. }
+                if playhead.is_playing =>
+            {
                 return Ok(Err(Reason::NoEffectHere.into()));
             }
-            Command::Step { count } => {
-                let step = self.step_by(*count, now_ns)?;
+            CommandKind::Action(Action::Step { count }) => {
+                let step = self.step_by(i64::from(*count), now_ns)?;
+                self.playhead.go_to(step, now_ns);
+            }
+            CommandKind::StepBack { count } => {
+                let step = self.step_by(-i64::from(*count), now_ns)?;
                 self.playhead.go_to(step, now_ns);
             }
             _ => return Ok(Err(Refusal::OnlyLive)),
@@ -213,10 +229,10 @@ impl<'a> Player<'a> {
     }
 
     /// Returns the recorded step `count` recorded steps ahead, or back.
-    fn step_by(&mut self, count: i32, now_ns: u64) -> Result<u64, ReadError> {
+    fn step_by(&mut self, count: i64, now_ns: u64) -> Result<u64, ReadError> {
         let tape = &mut self.recording.tape;
         let here = tape.step_at(self.playhead.step(now_ns))?;
-        let distance = u64::from(count.unsigned_abs()).saturating_mul(tape.stride());
+        let distance = count.unsigned_abs().saturating_mul(tape.stride());
         if count < 0 {
             return tape.step_at(here.saturating_sub(distance));
         }

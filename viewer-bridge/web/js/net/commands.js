@@ -17,18 +17,18 @@ export class Commands {
   }
 
   /** Sends a command, and later calls `onOutcome` with its outcome. Returns false without a connection.
-   * @param {string} type @param {object} [fields] @param {OnOutcome} [onOutcome] */
-  run(type, fields = {}, onOutcome = () => {}) {
+   * @param {string} kind @param {object} [fields] @param {OnOutcome} [onOutcome] */
+  run(kind, fields = {}, onOutcome = () => {}) {
     this.lastId = (this.lastId + 1) % 2 ** 32;
-    const isSent = this.send({ type, id: this.lastId, ...fields });
+    const isSent = this.send({ kind, id: this.lastId, ...fields });
     if (isSent) this.waiting.set(this.lastId, onOutcome);
     if (this.waiting.size > WAITING_MAX) this.waiting.delete([...this.waiting.keys()][0]);
     return isSent;
   }
 
-  /** Sends a command without an id, for those sent once per frame: the bridge answers only a refusal. @param {string} type @param {object} fields */
-  stream(type, fields) {
-    return this.send({ type, ...fields });
+  /** Sends a command without an id, for those sent once per frame: the bridge answers only a refusal. @param {string} kind @param {object} fields */
+  stream(kind, fields) {
+    return this.send({ kind, ...fields });
   }
 
   /** @param {Outcome} outcome */

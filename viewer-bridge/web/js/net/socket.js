@@ -16,7 +16,7 @@ import { decode } from "./wire.js";
  * }} Handlers  onProgress: the share of a long scene that has arrived, null once it is there
  */
 
-export const PROTOCOL = 2;
+export const PROTOCOL = 3;
 const FIRST_DELAY_MS = 250;
 const DELAY_MAX_MS = 5000;
 /** Close codes after which another attempt cannot succeed. */

@@ -1,51 +1,23 @@
-// The commands that a user can give by hand, with their fields (PROTOCOL.md, section 4), and how a typed text becomes a value.
+// How the text that a user types for a field of an action becomes a value.
 
-/** @typedef {"index" | "count" | "step" | "number" | "vector" | "rotation" | "text" | "value"} Form */
-/** @typedef {{ name: string, form: Form, example: string, isOptional?: boolean }} Field */
+import { ACTIONS } from "./tables.js";
 
-/** @type {Field} */
-const PARTICLE = { name: "particle", form: "index", example: "0" };
-/** @type {Field} */
-const CENTER = { name: "center", form: "vector", example: "0 1 0" };
-/** @type {Field} */
-const RADIUS = { name: "radius", form: "number", example: "0.2" };
-/** @type {Field[]} */
-const MOTION = [{ name: "target", form: "vector", example: "0 1 0" }, { name: "over_s", form: "number", example: "0.017", isOptional: true }];
-/** @type {Field} */
-const OVER = { name: "over_s", form: "number", example: "1", isOptional: true };
-/** @type {Field[]} */
-const POSE = [{ name: "translation", form: "vector", example: "0 0.1 0" }, { name: "rotation", form: "rotation", example: "0 0 0 1", isOptional: true }];
-/** @type {Field} */
-const COLLIDER = { name: "collider", form: "index", example: "0" };
+/** @typedef {import("./tables.js").Field} Field */
 
-/** The fields per command. @type {Record<string, Field[]>} */
-export const COMMANDS = {
-  pin: [PARTICLE],
-  unpin: [PARTICLE],
-  grab: [PARTICLE, ...MOTION],
-  move: [PARTICLE, ...MOTION],
-  release: [PARTICLE],
-  push: [CENTER, RADIUS, { name: "delta", form: "vector", example: "0 0 0.01" }, { name: "limit", form: "number", example: "2", isOptional: true }],
-  cut: [{ name: "constraint", form: "index", example: "0" }],
-  cut_radius: [CENTER, RADIUS],
-  cut_segment: [{ name: "from", form: "vector", example: "-1 1 0" }, { name: "to", form: "vector", example: "1 1 0" }, { name: "direction", form: "vector", example: "0 0 1" }],
-  move_collider: [COLLIDER, ...POSE, OVER],
-  move_anchor: [{ name: "anchor", form: "index", example: "0" }, ...POSE, OVER],
-  drive_body: [COLLIDER, ...POSE, ...["velocity", "angular_velocity", "force", "torque"].map((name) => (/** @type {Field} */ ({ name, form: "vector", example: "0 0 0", isOptional: true })))],
-  set: [{ name: "parameter", form: "text", example: "damping" }, { name: "value", form: "value", example: "0.5" }, { name: "constraint_kind", form: "text", example: "structural", isOptional: true }, { name: "block", form: "index", example: "0", isOptional: true }, { ...COLLIDER, isOptional: true }],
-  step: [{ name: "count", form: "count", example: "1" }],
-  rewind: [{ name: "to_step", form: "step", example: "0" }],
-  load: [{ name: "scene", form: "text", example: "curtain" }],
-  mark: [{ name: "text", form: "text", example: "it slips" }],
-  reset: [],
-  pause: [],
-  resume: [],
+/** Examples of values, of a field or of its form. @type {Record<string, string>} */
+const EXAMPLES = {
+  count: "1", delta: "0 0 0.01", parameter: "damping", scene: "curtain", text: "it slips",
+  whole: "0", long: "0", number: "0.2", vector: "0 1 0", rotation: "0 0 0 1", value: "0.5", kind: "structural",
 };
-
-/** Numbers per form. @type {Partial<Record<Form, number>>} */
+/** Numbers per form. @type {Record<string, number>} */
 const LENGTHS = { vector: 3, rotation: 4 };
-/** Largest number per form. @type {Partial<Record<Form, number>>} */
-const LARGEST = { index: 2 ** 32 - 1, count: 2 ** 31 - 1, step: Number.MAX_SAFE_INTEGER };
+/** Largest number per form. @type {Record<string, number>} */
+const LARGEST = { whole: 2 ** 32 - 1, long: Number.MAX_SAFE_INTEGER };
+/** Largest size of a text in UTF-8. */
+const TEXT_BYTES_MAX = 160;
+
+/** @param {Field} field */
+export const exampleOf = ({ name, form }) => EXAMPLES[name] ?? EXAMPLES[form];
 
 /** Reads the numbers in a text, separated by spaces or commas. Null if a part is not a number. @param {string} text */
 function numbers(text) {
@@ -54,11 +26,13 @@ function numbers(text) {
 }
 
 /** Reads the text of a field. A wrong one has the reason. @param {Field} field @param {string} text @returns {{ value: unknown } | { fault: string }} */
-export function read({ name, form, example }, text) {
+export function read(field, text) {
+  const { name, form } = field;
   const trimmed = text.trim();
-  const fault = (/** @type {string} */ what) => ({ fault: `${name}: ${trimmed === "" ? "missing" : `"${trimmed}" is not ${what}`} (for example ${example})` });
+  const fault = (/** @type {string} */ what) => ({ fault: `${name}: ${trimmed === "" ? "missing" : `"${trimmed}" is not ${what}`} (for example ${exampleOf(field)})` });
   if (trimmed === "") return fault("");
-  if (form === "text") return { value: trimmed };
+  if (form === "kind") return { value: trimmed };
+  if (form === "text") return new TextEncoder().encode(trimmed).length <= TEXT_BYTES_MAX ? { value: trimmed } : fault(`a text of at most ${TEXT_BYTES_MAX} bytes`);
   if (form === "value" && trimmed === "off") return { value: null };
   const all = numbers(trimmed);
   if (form === "value") return all !== null && (all.length === 1 || all.length === 3) ? { value: all.length === 1 ? all[0] : all } : fault("a number, three numbers or off");
@@ -70,16 +44,15 @@ export function read({ name, form, example }, text) {
   return { value: all[0] };
 }
 
-/** Builds the fields of a message. An optional field without a text is left out. @param {string} command @param {string[]} texts of its fields @param {number} epoch of the load on show @returns {{ fields: Record<string, unknown> } | { fault: string }} */
-export function messageOf(command, texts, epoch) {
+/** Builds the fields of an action. An optional field without a text is left out. @param {string} kind @param {string[]} texts of its fields @returns {{ fields: Record<string, unknown> } | { fault: string }} */
+export function fieldsOf(kind, texts) {
   /** @type {Record<string, unknown>} */
   const fields = {};
-  for (const [index, field] of COMMANDS[command].entries()) {
+  for (const [index, field] of ACTIONS[kind].entries()) {
     if (field.isOptional && texts[index].trim() === "") continue;
     const result = read(field, texts[index]);
     if ("fault" in result) return result;
     fields[field.name] = result.value;
   }
-  // In messages of pages, a cut names several constraints of a load.
-  return { fields: command === "cut" ? { epoch, constraints: [fields.constraint] } : fields };
+  return { fields };
 }

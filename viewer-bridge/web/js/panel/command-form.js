@@ -2,7 +2,8 @@
 
 import { sentence } from "../ui/banner.js";
 import { enable, find, make } from "../ui/dom.js";
-import { COMMANDS, messageOf } from "./command-fields.js";
+import { exampleOf, fieldsOf } from "./command-fields.js";
+import { ACTIONS } from "./tables.js";
 
 export class CommandForm {
   /** @param {import("../tools/tool.js").App} app */
@@ -17,7 +18,7 @@ export class CommandForm {
     this.inputs = [];
     /** The texts per field, which other commands share. @type {Map<string, string>} */
     this.texts = new Map();
-    this.choice.append(...Object.keys(COMMANDS).map((name) => make("option", { value: name }, name)));
+    this.choice.append(...Object.keys(ACTIONS).map((name) => make("option", { value: name }, name)));
     this.choice.addEventListener("change", () => this.build());
     this.form.addEventListener("submit", (event) => {
       event.preventDefault();
@@ -29,13 +30,15 @@ export class CommandForm {
   }
 
   build() {
-    this.inputs = COMMANDS[this.choice.value].map(({ name, example, isOptional }) => {
+    this.inputs = ACTIONS[this.choice.value].map((field) => {
+      const { name, isOptional } = field;
+      const example = exampleOf(field);
       const input = make("input", { type: "text", class: "value", placeholder: isOptional ? `${example} (optional)` : example, autocomplete: "off", spellcheck: "false" });
       input.value = this.texts.get(name) ?? "";
       input.addEventListener("input", () => this.texts.set(name, input.value));
       return input;
     });
-    this.rows.replaceChildren(...this.inputs.map((input, index) => make("label", {}, make("span", {}, COMMANDS[this.choice.value][index].name), input)));
+    this.rows.replaceChildren(...this.inputs.map((input, index) => make("label", {}, make("span", {}, ACTIONS[this.choice.value][index].name), input)));
     this.answer.textContent = "";
   }
 
@@ -46,12 +49,11 @@ export class CommandForm {
   }
 
   submit() {
-    const { simulation, commands } = this.app;
     const command = this.choice.value;
-    const message = messageOf(command, this.inputs.map(({ value }) => value), simulation.scene?.epoch ?? 0);
+    const message = fieldsOf(command, this.inputs.map(({ value }) => value));
     this.answer.textContent = "";
     if ("fault" in message) return this.say(message.fault, true);
-    commands.run(command, message.fields, ({ status, step, applied, text, reason }) => {
+    this.app.commands.run(command, message.fields, ({ status, step, applied, text, reason }) => {
       if (this.choice.value !== command) return false;
       if (status === "applied") this.say(step === null ? "Nothing to do." : `Applied in step ${step}${applied > 1 ? ` (${applied} parts)` : ""}.`, false);
       else this.say(sentence(text || reason), true);

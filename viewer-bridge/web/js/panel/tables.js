@@ -1,4 +1,4 @@
-// Generated from the table of parameters; do not edit. `UPDATE_GOLDEN=1 cargo test -p viewer-bridge golden` rewrites it.
+// Generated from the tables of parameters and actions; do not edit. `UPDATE_GOLDEN=1 cargo test -p viewer-bridge golden` rewrites it.
 
 /**
  * A row of the panel. A "log" slider is logarithmic, and starts with 0 if `hasZero`. `whenOn` is the value
@@ -30,3 +30,29 @@ export const ROWS = [
   { name: "restitution", label: "Collider bounce", unit: "", kind: "linear", least: 0, most: 1, parts: "colliders" },
   { name: "time_scale", label: "Speed", unit: "×", kind: "log", least: 0.01, most: 10 },
 ];
+
+/** @typedef {{ name: string, form: "whole" | "long" | "number" | "vector" | "rotation" | "text" | "value" | "kind", isOptional?: boolean }} Field */
+
+/** The fields of each action that a user can give by hand. @type {Record<string, Field[]>} */
+export const ACTIONS = {
+  pin: [{ name: "particle", form: "whole" }],
+  unpin: [{ name: "particle", form: "whole" }],
+  grab: [{ name: "particle", form: "whole" }, { name: "target", form: "vector" }, { name: "over_s", form: "number", isOptional: true }],
+  move: [{ name: "particle", form: "whole" }, { name: "target", form: "vector" }, { name: "over_s", form: "number", isOptional: true }],
+  release: [{ name: "particle", form: "whole" }],
+  pause: [],
+  resume: [],
+  step: [{ name: "count", form: "whole" }],
+  reset: [],
+  push: [{ name: "center", form: "vector" }, { name: "radius", form: "number" }, { name: "delta", form: "vector" }, { name: "limit", form: "number", isOptional: true }],
+  cut: [{ name: "constraint", form: "whole" }],
+  cut_radius: [{ name: "center", form: "vector" }, { name: "radius", form: "number" }],
+  cut_segment: [{ name: "from", form: "vector" }, { name: "to", form: "vector" }, { name: "direction", form: "vector" }],
+  move_anchor: [{ name: "anchor", form: "whole" }, { name: "translation", form: "vector" }, { name: "rotation", form: "rotation", isOptional: true }, { name: "over_s", form: "number", isOptional: true }],
+  move_collider: [{ name: "collider", form: "whole" }, { name: "translation", form: "vector" }, { name: "rotation", form: "rotation", isOptional: true }, { name: "over_s", form: "number", isOptional: true }],
+  set: [{ name: "parameter", form: "text" }, { name: "value", form: "value" }, { name: "constraint_kind", form: "kind", isOptional: true }, { name: "block", form: "whole", isOptional: true }, { name: "collider", form: "whole", isOptional: true }],
+  load: [{ name: "scene", form: "text" }],
+  rewind: [{ name: "to_step", form: "long", isOptional: true }, { name: "back_steps", form: "whole", isOptional: true }],
+  mark: [{ name: "text", form: "text" }],
+  drive_body: [{ name: "collider", form: "whole" }, { name: "translation", form: "vector" }, { name: "rotation", form: "rotation", isOptional: true }, { name: "velocity", form: "vector", isOptional: true }, { name: "angular_velocity", form: "vector", isOptional: true }, { name: "force", form: "vector", isOptional: true }, { name: "torque", form: "vector", isOptional: true }],
+};

@@ -30,9 +30,9 @@ export class Wishes {
     const forces = wanted.forces();
     const speeds = wanted.speeds();
     const inspected = wanted.inspected();
-    if (forces !== this.forces && commands.stream("forces", { is_on: forces })) this.forces = forces;
-    if (speeds !== this.speeds && commands.stream("speeds", { is_on: speeds })) this.speeds = speeds;
-    if (!isSame(inspected, this.inspected) && commands.stream("inspect", { particles: inspected })) this.inspected = inspected;
+    if (forces !== this.forces && commands.send({ type: "forces", is_on: forces })) this.forces = forces;
+    if (speeds !== this.speeds && commands.send({ type: "speeds", is_on: speeds })) this.speeds = speeds;
+    if (!isSame(inspected, this.inspected) && commands.send({ type: "inspect", particles: inspected })) this.inspected = inspected;
   }
 }
 

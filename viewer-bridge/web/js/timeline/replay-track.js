@@ -46,7 +46,7 @@ export class ReplayTrack {
     this.loopEnd.addEventListener("click", () => this.loopTo());
     this.zoom.addEventListener("change", () => this.onChange());
     find("track", HTMLElement).addEventListener("wheel", (event) => this.zoomBy(event), { passive: false });
-    this.rate.addEventListener("change", () => commands.run("rate", { value: Number(this.rate.value) }));
+    this.rate.addEventListener("change", () => commands.run("set", { parameter: "time_scale", value: Number(this.rate.value) }));
     this.file.addEventListener("change", () => { location.href = addressBeside(location.pathname, this.file.value); });
     this.ghost.addEventListener("change", () => commands.run("ghost", this.ghost.value === "" ? {} : { name: this.ghost.value }, () => this.showGhost()));
     simulation.on("ghost", () => this.showGhost());
@@ -140,7 +140,8 @@ export class ReplayTrack {
   /** @param {number} count */
   step(count) {
     if (this.simulation.playback?.is_playing) this.commands.run("pause");
-    this.commands.run("step", { count });
+    if (count > 0) this.commands.run("step", { count });
+    else this.commands.run("step_back", { count: -count });
   }
 
   showRecording() {

@@ -49,7 +49,7 @@ export class CutTool {
     const countMax = simulation.hello?.limits.constraints_per_cut ?? 256;
     for (let first = 0; first < crossed.length; first += countMax) {
       const constraints = crossed.slice(first, first + countMax);
-      const isSent = commands.run("cut", { epoch: scene.epoch, constraints, stroke: this.number }, ({ status }) => {
+      const isSent = commands.run("cut_constraints", { epoch: scene.epoch, constraints, stroke: this.number }, ({ status }) => {
         if (status === "applied" && simulation.isPaused) simulation.expectCut(scene.epoch, constraints);
       });
       if (isSent) for (const one of constraints) this.sent.add(one);

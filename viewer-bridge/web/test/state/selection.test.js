@@ -30,7 +30,7 @@ function started() {
 test("a selection has the exact states of its particles and of the ends of its constraints", () => {
   const { simulation, selection } = started();
   const sent = [];
-  const wishes = new Wishes(simulation, { stream: (type, fields) => sent.push({ type, ...fields }) > 0 }, { forces: () => false, speeds: () => false, inspected: () => selection.particles });
+  const wishes = new Wishes(simulation, { send: (message) => sent.push(message) > 0 }, { forces: () => false, speeds: () => false, inspected: () => selection.particles });
   wishes.tick();
   assert.deepEqual(sent, [], "there is no connection");
   simulation.setConnected(true);

@@ -30,7 +30,7 @@ function at({ listeners, event }, type, dx = 0, dy = 0, change = {}) {
   listeners.get(type)({ ...event, type, clientX: event.clientX + dx, clientY: event.clientY + dy, ...change });
 }
 
-const types = ({ sent }) => sent.map(({ type }) => type);
+const kinds = ({ sent }) => sent.map(({ kind }) => kind);
 const isCarried = (page) => (at(page, "pointerdown"), page.input.tool.carried !== undefined);
 const nearly = (value, expected, within = 1e-9) => assert.ok(length(subtract(value, expected)) < within, `${value} is not ${expected}`);
 
@@ -42,13 +42,13 @@ test("a drag on a solid carries it along with the pointer, once per frame", () =
     assert.deepEqual(page.sent, []);
     at(page, "pointermove", 20, 5);
     at(page, "pointermove", 40, 10);
-    assert.deepEqual(page.sent.map(({ id, ...rest }) => rest), [{ type: "lift", epoch: 1, object: "collider", index: 7 }]);
+    assert.deepEqual(page.sent.map(({ id, ...rest }) => rest), [{ kind: "lift", epoch: 1, object: "collider", index: 7 }]);
     const { tool } = page.input;
     page.input.tick(tool.sentMs + 20);
     page.input.tick(tool.sentMs + 20);
-    assert.deepEqual(types(page), ["lift", "carry"], solid.shape);
+    assert.deepEqual(kinds(page), ["lift", "carry"], solid.shape);
     const { over_s, offset, ...rest } = page.sent[1];
-    assert.deepEqual(rest, { type: "carry", object: "collider", index: 7 });
+    assert.deepEqual(rest, { kind: "carry", object: "collider", index: 7 });
     nearly([over_s, 0, 0], [0.02, 0, 0]);
     // The point that was pressed is under the pointer now.
     const pixel = page.camera.project(add(tool.from, offset), VIEWPORT);
@@ -85,10 +85,10 @@ test("a throw has the velocity of the pointer, and none after a rest", (context)
     const unit = page.camera.unitsPerPixel(page.input.tool.from, VIEWPORT);
     at(page, "pointerup", 0, -3 * frames);
     const { id, velocity, ...thrown } = page.sent[page.sent.length - 1];
-    assert.deepEqual(thrown, { type: "throw", object: "collider", index: 0 });
+    assert.deepEqual(thrown, { kind: "throw", object: "collider", index: 0 });
     // Three pixels in 9 ms.
     nearly(velocity, rest > 0 ? [0, 0, 0] : scale(page.camera.basis().up, (3000 / 9) * unit), 1e-6);
-    assert.equal(types(page).filter((type) => type === "throw").length, 1);
+    assert.equal(kinds(page).filter((kind) => kind === "throw").length, 1);
     assert.equal(page.input.tool, null);
   }
 });
@@ -102,7 +102,7 @@ test("a press that lasts carries, and a click on a solid sends nothing", () => {
   const { pressedMs } = page.input.tool;
   page.input.tick(pressedMs + 250);
   at(page, "pointerup", 0, 0, { timeStamp: pressedMs + 250 });
-  assert.deepEqual(types(page), ["lift", "throw"]);
+  assert.deepEqual(kinds(page), ["lift", "throw"]);
   assert.deepEqual(page.sent[1].velocity, [0, 0, 0]);
 });
 
@@ -112,14 +112,14 @@ test("another scene, a reset and a lost connection end the carrying", () => {
     at(page, "pointerdown");
     at(page, "pointermove", 50);
     change(page);
-    assert.deepEqual(types(page), ["lift", "throw"]);
+    assert.deepEqual(kinds(page), ["lift", "throw"]);
     assert.deepEqual([page.sent[1].velocity, page.input.tool], [[0, 0, 0], null]);
   }
   const page = shown([SPHERE]);
   at(page, "pointerdown");
   at(page, "pointermove", 50);
   page.input.abandon();
-  assert.deepEqual(types(page), ["lift"]);
+  assert.deepEqual(kinds(page), ["lift"]);
 });
 
 test("nothing more is sent for an object that another page carries", () => {
@@ -129,7 +129,7 @@ test("nothing more is sent for an object that another page carries", () => {
   page.commands.receive({ type: "outcome", id: page.sent[0].id, status: "rejected", reason: "grabbed_by_other" });
   page.input.tick(performance.now());
   at(page, "pointerup", 50);
-  assert.deepEqual(types(page), ["lift"]);
+  assert.deepEqual(kinds(page), ["lift"]);
 });
 
 test("planes and bounds are not carried, and dragging them turns the view", () => {
@@ -200,18 +200,18 @@ test("a drag on an anchored particle carries its anchor, without a jump", () => 
   at(page, "pointerdown", 6);
   at(page, "pointermove", 6, 40);
   page.input.tick(performance.now());
-  assert.deepEqual(page.sent.map(({ type, object, index }) => [type, object, index]), [["lift", "anchor", 1], ["carry", "anchor", 1]]);
+  assert.deepEqual(page.sent.map(({ kind, object, index }) => [kind, object, index]), [["lift", "anchor", 1], ["carry", "anchor", 1]]);
   nearly(page.sent[1].offset, scale(page.camera.basis().up, -40 * page.camera.unitsPerPixel([0, 0, 0], VIEWPORT)), 1e-6);
   assert.deepEqual(page.input.tool.describe().line.particle, 0);
   at(page, "pointerup", 6, 40);
-  assert.equal(types(page).pop(), "throw");
+  assert.equal(kinds(page).pop(), "throw");
 });
 
 test("a pinned particle, and one without a known anchor, are grabbed", () => {
   for (const page of [anchored(PIN.anchored | PIN.pinned), anchored(PIN.anchored, []), anchored(PIN.frozen)]) {
     at(page, "pointerdown");
     at(page, "pointermove", 40);
-    assert.deepEqual(types(page), ["grab"]);
+    assert.deepEqual(kinds(page), ["grab"]);
   }
 });
 
@@ -222,7 +222,7 @@ test("a click selects an anchored particle, and P pins it while it is carried", 
   assert.deepEqual([page.sent, page.selection.items], [[], [{ kind: "particle", index: 0 }]]);
   at(page, "pointerdown");
   assert.ok(page.input.pinByKey());
-  assert.deepEqual(types(page), ["pin"]);
+  assert.deepEqual(kinds(page), ["pin"]);
   const solid = shown([SPHERE]);
   at(solid, "pointerdown");
   assert.ok(!solid.input.pinByKey());

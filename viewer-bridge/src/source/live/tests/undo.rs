@@ -2,26 +2,31 @@
 
 use serde_json::Value;
 use sim_contract::{
-    Action, KeyframeHeader, Load as OwnerLoad, Outcome, Parameter, ParameterValue, ParticleState,
-    Reason, ReceivedState, RestoreContents, SnapshotHeader, Text,
+    Action, KeyframeHeader, Load as OwnerLoad, Outcome, Parameter, ParticleState, Reason,
+    ReceivedState, RestoreContents, SnapshotHeader, Text,
 };
 use sim_solver::{Pose, Scene, Solver, builtin};
 
-use super::{Fixture, RUN_ID, Sent, load, newest_text};
+use super::{Fixture, RELEASE, RUN_ID, Sent, load, newest_text};
 use crate::limits::UNDO_MAX;
-use crate::message::Command;
+use crate::message::{Brush, Command, CommandKind};
 use crate::request::{ClientId, RequestKind};
 
 /// A program beside the bridge.
 const OTHER: u64 = 1;
 const RESET: Action = Action::Reset;
 
+fn load_rope() -> Action {
+    Action::Load { scene: Text::cut("rope") }
+}
+
 fn rewind(to_step: u64) -> Action {
     Action::Rewind { to_step: Some(to_step), back_steps: None }
 }
 
 fn cut(stroke: u32) -> Command {
-    Command::Cut { epoch: 1, constraints: vec![0], stroke: Some(stroke) }
+    let kind = CommandKind::CutConstraints { epoch: 1, constraints: vec![0] };
+    Command { stroke: Some(stroke), ..Command::new(kind) }
 }
 
 /// A load with a scene that the catalog has.
@@ -81,11 +86,11 @@ impl Fixture {
     }
 
     fn ask(&mut self, id: u32, command: Command) {
-        self.request(RequestKind::Command { id: Some(id), command });
+        self.request(RequestKind::Command(Command { id: Some(id), ..command }));
     }
 
     fn undo(&mut self, takes_others: bool) {
-        self.ask(99, Command::Undo { takes_others });
+        self.ask(99, Command::new(CommandKind::Undo { takes_others }));
     }
 
     /// Publishes an outcome.
@@ -94,6 +99,11 @@ impl Fixture {
         self.outcome_count += 1;
         self.owner.publish_outcome(&outcome).unwrap();
         self.read();
+    }
+
+    /// An action of the page is applied at a step.
+    fn act(&mut self, action: Action, step: u64) {
+        self.change(Command::new(action), step);
     }
 
     /// The page does something that is applied at a step.
@@ -164,7 +174,7 @@ fn a_cut_is_undone_by_a_rewind_to_the_last_step_without_it() {
 #[test]
 fn the_cuts_of_a_stroke_are_undone_together_and_several_changes_one_after_another() {
     let mut fixture = Fixture::start();
-    fixture.change(Command::Reset {}, 100);
+    fixture.act(RESET, 100);
     for step in [200, 204, 209] {
         fixture.change(cut(1), step);
     }
@@ -183,12 +193,12 @@ fn the_cuts_of_a_stroke_are_undone_together_and_several_changes_one_after_anothe
 fn drags_and_pins_are_undone_one_after_another() {
     let mut fixture = Fixture::start();
     let target = [0.0; 3];
-    fixture.change(Command::Load { scene: "rope".to_owned() }, 90);
-    fixture.change(Command::Grab { particle: 1, target, over_s: 0.1 }, 100);
-    fixture.change(Command::Move { particle: 1, target, over_s: 0.1 }, 110);
-    fixture.change(Command::Release { particle: 1 }, 120);
-    fixture.change(Command::Pin { particle: 0 }, 200);
-    fixture.change(Command::Unpin { particle: 0 }, 300);
+    fixture.act(load_rope(), 90);
+    fixture.act(Action::Grab { particle: 1, target, over_s: 0.1 }, 100);
+    fixture.act(Action::Move { particle: 1, target, over_s: 0.1 }, 110);
+    fixture.act(RELEASE, 120);
+    fixture.act(Action::Pin { particle: 0 }, 200);
+    fixture.act(Action::Unpin { particle: 0 }, 300);
     for (to_step, left) in [(299, "pin"), (199, "drag"), (99, "load")] {
         fixture.undo(false);
         fixture.answer_undo(rewind(to_step), 400, Ok(()));
@@ -199,15 +209,11 @@ fn drags_and_pins_are_undone_one_after_another() {
 #[test]
 fn the_motion_of_a_slider_is_undone_as_a_whole_but_never_the_pace() {
     let mut fixture = Fixture::start();
-    let set = |parameter: Parameter, value, stroke| Command::Set {
-        parameter: parameter.name().to_owned(),
-        value: ParameterValue::Number(value),
-        constraint_kind: None,
-        block: None,
-        collider: None,
-        stroke: Some(stroke),
+    let set = |parameter: Parameter, value: f32, stroke| {
+        let set = Action::set(parameter.name(), value);
+        Command { stroke: Some(stroke), ..Command::new(set) }
     };
-    fixture.change(Command::Reset {}, 100);
+    fixture.act(RESET, 100);
     for (step, damping) in [(200, 0.2), (204, 0.3), (209, 0.4)] {
         fixture.change(set(Parameter::Damping, damping, 2), step);
     }
@@ -221,15 +227,16 @@ fn the_motion_of_a_slider_is_undone_as_a_whole_but_never_the_pace() {
 #[test]
 fn a_stroke_of_the_brush_is_undone_as_a_whole_and_apart_from_a_cut() {
     let mut fixture = Fixture::start();
-    let brush = |stroke| Command::Brush {
+    let brush = Brush {
         eye: [0.0, 0.0, 5.0],
         ray: [0.0, 0.0, -1.0],
         radius: 1.0,
         delta: [0.1, 0.0, 0.0],
         over_s: 0.1,
         cap: None,
-        stroke: Some(stroke),
     };
+    let brush =
+        |stroke| Command { stroke: Some(stroke), ..Command::new(CommandKind::Brush(brush)) };
     fixture.change(brush(1), 100);
     fixture.change(brush(1), 105);
     fixture.change(cut(1), 200);
@@ -247,7 +254,7 @@ fn a_stroke_of_the_brush_is_undone_as_a_whole_and_apart_from_a_cut() {
 #[test]
 fn a_state_of_another_step_and_changes_of_the_same_pause_are_named() {
     let mut fixture = Fixture::start();
-    fixture.change(Command::Pin { particle: 1 }, 50);
+    fixture.act(Action::Pin { particle: 1 }, 50);
     fixture.change(cut(1), 50);
     fixture.undo(false);
     let sent = fixture.arrived();
@@ -282,9 +289,11 @@ fn a_page_undoes_its_own_changes_only_and_loses_them_with_its_connection() {
     fixture.change_of_other(RESET, 10);
     fixture.undo(false);
     assert_eq!(fixture.refusal(), "nothing_to_undo");
-    fixture.change(Command::Reset {}, 20);
-    let reader =
-        RequestKind::Command { id: Some(3), command: Command::Undo { takes_others: true } };
+    fixture.act(RESET, 20);
+    let reader = RequestKind::Command(Command {
+        id: Some(3),
+        ..Command::new(CommandKind::Undo { takes_others: true })
+    });
     let request = crate::request::Request { client: ClientId::Page(2), kind: reader };
     fixture.link.handle(request, &fixture.shown, &fixture.sinks);
     assert!(fixture.arrived().is_empty());
@@ -300,7 +309,7 @@ fn a_load_is_undone_by_the_former_scene_and_its_state() {
     // Between two keyframes only the step of the scene changes.
     fixture.publish_kept(25, 1, 10);
     fixture.read();
-    fixture.change(Command::Load { scene: "rope".to_owned() }, 30);
+    fixture.act(load_rope(), 30);
     fixture.begin("rope", 30, 2);
     fixture.undo(false);
     let scene = Text::new("curtain").unwrap();
@@ -320,7 +329,7 @@ fn a_state_on_the_way_of_a_collider_is_not_completed_by_an_earlier_keyframe() {
     fixture.begin_with("curtain", 1, 1, &keyframe_in_motion());
     fixture.publish_kept(25, 1, 1);
     fixture.read();
-    fixture.change(Command::Load { scene: "rope".to_owned() }, 30);
+    fixture.act(load_rope(), 30);
     fixture.begin("rope", 30, 2);
     fixture.undo(false);
     assert!(fixture.arrived().is_empty(), "the collider would be elsewhere");
@@ -331,10 +340,11 @@ fn changes_before_a_load_are_undone_after_it_although_the_node_forgot_them() {
     let mut fixture = Fixture::start();
     fixture.begin("curtain", 10, 1);
     let epoch = fixture.shown.epoch();
-    fixture.change(Command::Cut { epoch, constraints: vec![0], stroke: Some(1) }, 11);
+    let kind = CommandKind::CutConstraints { epoch, constraints: vec![0] };
+    fixture.change(Command { stroke: Some(1), ..Command::new(kind) }, 11);
     fixture.publish_kept(12, 1, 10);
     fixture.read();
-    fixture.change(Command::Load { scene: "rope".to_owned() }, 13);
+    fixture.act(load_rope(), 13);
     fixture.begin("rope", 13, 2);
     fixture.undo(false);
     fixture.answer_undo(Action::Load { scene: Text::new("curtain").unwrap() }, 14, Ok(()));
@@ -351,7 +361,7 @@ fn changes_before_a_load_are_undone_after_it_although_the_node_forgot_them() {
 fn a_step_that_the_node_does_not_keep_is_restored_from_the_bridge() {
     let mut fixture = Fixture::start();
     fixture.begin("curtain", 10, 1);
-    fixture.change(Command::Reset {}, 11);
+    fixture.act(RESET, 11);
     fixture.undo(false);
     fixture.answer_undo(rewind(10), 12, Err(Reason::UnknownStep));
     assert_eq!(fixture.given_state(13).particles[0].position[0], 10.0);
@@ -362,7 +372,7 @@ fn a_step_that_the_node_does_not_keep_is_restored_from_the_bridge() {
 fn an_undo_that_cannot_be_exact_is_refused_with_the_cure() {
     // Without a keyframe, the state is not complete.
     let mut fixture = Fixture::start();
-    fixture.change(Command::Reset {}, 11);
+    fixture.act(RESET, 11);
     fixture.undo(false);
     fixture.answer_undo(rewind(10), 12, Err(Reason::NoEffectHere));
     let answer = fixture.answer_of_undo();
@@ -375,7 +385,7 @@ fn an_undo_that_cannot_be_exact_is_refused_with_the_cure() {
     fixture.owner.publish_keyframe(header, &keyframe()).unwrap();
     fixture.publish(1, 0, 2);
     fixture.read();
-    fixture.change(Command::Load { scene: "rope".to_owned() }, 2);
+    fixture.act(load_rope(), 2);
     fixture.begin("rope", 2, 1);
     fixture.undo(false);
     assert_eq!(fixture.refusal(), "scene_not_known");
@@ -383,7 +393,7 @@ fn an_undo_that_cannot_be_exact_is_refused_with_the_cure() {
     // The file of the scene has another content by now.
     let mut fixture = Fixture::start();
     fixture.begin("curtain", 10, 1);
-    fixture.change(Command::Load { scene: "rope".to_owned() }, 11);
+    fixture.act(load_rope(), 11);
     fixture.begin("rope", 11, 2);
     fixture.undo(false);
     fixture.answer_undo(Action::Load { scene: Text::new("curtain").unwrap() }, 12, Ok(()));
@@ -396,7 +406,7 @@ fn the_number_of_changes_is_bounded() {
     let mut fixture = Fixture::start();
     let count = UNDO_MAX as u64 + 5;
     for step in 1..=count {
-        fixture.change(Command::Reset {}, step);
+        fixture.act(RESET, step);
     }
     for undone in 0..UNDO_MAX as u64 {
         fixture.undo(false);
@@ -421,7 +431,7 @@ fn a_grabbed_particle_leaves_no_grab_behind() {
     fixture.owner.publish_keyframe(header, &solver.keyframe().encode()).unwrap();
     fixture.publish_kept(11, 1, 11);
     fixture.read();
-    fixture.change(Command::Load { scene: "rope".to_owned() }, 12);
+    fixture.act(load_rope(), 12);
     fixture.begin("rope", 12, 2);
     fixture.undo(false);
     assert_eq!(fixture.refusal(), "state_not_kept");

@@ -2,11 +2,11 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use sim_contract::Parameter;
+use sim_contract::{Action, Parameter};
 
 use super::kept_state::KeptState;
 use crate::limits::{UNDO_MAX, UNDO_SIZE_BYTES_MAX};
-use crate::message::{Command, Undoable};
+use crate::message::{CommandKind, Undoable};
 use crate::request::ClientId;
 
 /// Commands whose outcome has not arrived. Beyond it, the oldest one cannot be undone.
@@ -78,26 +78,31 @@ pub(in crate::source::live) struct Change {
     pub(in crate::source::live) command: Option<u64>,
 }
 
-/// Returns the kind of a command that can be undone, and the number of its stroke.
-pub(super) fn undoable(command: &Command) -> Option<(Undoable, Option<u32>)> {
-    match command {
-        Command::Cut { stroke, .. } => Some((Undoable::Cut, *stroke)),
-        Command::Brush { stroke, .. } => Some((Undoable::Brush, *stroke)),
-        Command::Grab { .. } => Some((Undoable::Drag, None)),
-        Command::Lift { .. } | Command::MoveCollider { .. } | Command::MoveAnchor { .. } => {
-            Some((Undoable::Carry, None))
+/// Returns the kind of change of a command that can be undone.
+pub(super) fn undoable(kind: &CommandKind) -> Option<Undoable> {
+    let action = match kind {
+        CommandKind::CutConstraints { .. } => return Some(Undoable::Cut),
+        CommandKind::Brush(_) => return Some(Undoable::Brush),
+        CommandKind::Lift { .. } => return Some(Undoable::Carry),
+        CommandKind::Action(action) => action,
+        _ => return None,
+    };
+    match action {
+        Action::Grab { .. } => Some(Undoable::Drag),
+        Action::MoveCollider { .. } | Action::MoveAnchor { .. } => Some(Undoable::Carry),
+        Action::Push { .. } => Some(Undoable::Brush),
+        Action::Pin { .. } => Some(Undoable::Pin),
+        Action::Unpin { .. } => Some(Undoable::Unpin),
+        Action::Cut { .. } | Action::CutSegment { .. } | Action::CutRadius { .. } => {
+            Some(Undoable::Cut)
         }
-        Command::Push { .. } => Some((Undoable::Brush, None)),
-        Command::Pin { .. } => Some((Undoable::Pin, None)),
-        Command::Unpin { .. } => Some((Undoable::Unpin, None)),
-        Command::CutSegment { .. } | Command::CutRadius { .. } => Some((Undoable::Cut, None)),
-        Command::Reset {} => Some((Undoable::Reset, None)),
+        Action::Reset => Some(Undoable::Reset),
         // The pace is no part of the state that an undo brings back.
-        Command::Set { parameter, stroke, .. } if parameter != Parameter::TimeScale.name() => {
-            Some((Undoable::Set, *stroke))
+        Action::Set { parameter, .. } if parameter.as_str() != Parameter::TimeScale.name() => {
+            Some(Undoable::Set)
         }
-        Command::Load { .. } => Some((Undoable::Load, None)),
-        Command::Rewind { .. } => Some((Undoable::Rewind, None)),
+        Action::Load { .. } => Some(Undoable::Load),
+        Action::Rewind { .. } => Some(Undoable::Rewind),
         _ => None,
     }
 }
