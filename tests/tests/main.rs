@@ -35,3 +35,5 @@ mod schemas;
 mod simulate;
 mod tidy;
 mod viewer;
+#[path = "../../viewer-bridge/tests/wire_decoder.rs"]
+mod wire_decoder;

@@ -11,7 +11,7 @@ use std::thread;
 use anyhow::Context;
 use sim_contract::clock::{SECOND_NS, monotonic_ns, sleep_until};
 use tungstenite::Message;
-use viewer_bridge::wire::{self, decode};
+use viewer_bridge::wire::Kind;
 
 /// Ticks of `/proc/PID/stat` per second.
 const TICKS_PER_SECOND: f64 = 100.0;
@@ -63,15 +63,23 @@ fn receive_frames(host: &str, end_ns: u64) -> anyhow::Result<Received> {
     while monotonic_ns() < end_ns {
         let Message::Binary(bytes) = socket.read()? else { continue };
         let now_ns = monotonic_ns();
-        if let wire::Message::Frame(frame) = decode(&bytes)? {
-            let head = frame.head;
+        let kind = u16::from_le_bytes(field(&bytes, 0)?);
+        if kind == Kind::FrameF32 as u16 || kind == Kind::FrameU16 as u16 {
+            let number = u32::from_le_bytes(field(&bytes, 72)?);
+            let published_ns = u64::from_le_bytes(field(&bytes, 80)?);
             received.frame_count += 1;
             received.size_bytes += bytes.len();
-            received.ages_ns.push(now_ns.saturating_sub(head.publish_monotonic_ns));
-            socket.send(Message::text(format!(r#"{{"type":"ack","frame":{}}}"#, head.number)))?;
+            received.ages_ns.push(now_ns.saturating_sub(published_ns));
+            socket.send(Message::text(format!(r#"{{"type":"ack","frame":{number}}}"#)))?;
         }
     }
     Ok(received)
+}
+
+/// Returns the bytes of a field of a message, at the offset that `PROTOCOL.md` gives.
+fn field<const N: usize>(bytes: &[u8], at: usize) -> anyhow::Result<[u8; N]> {
+    let field = bytes.get(at..at + N).context("a message is too short")?;
+    Ok(field.try_into()?)
 }
 
 fn print(mut received: Received, seconds: u64) {

@@ -3,9 +3,6 @@
 //! All numbers are little-endian. Every array begins at a multiple of four bytes.
 
 pub(crate) mod convert;
-mod cursor;
-mod decode;
-mod decode_error;
 mod forces;
 mod frame;
 mod ghost;
@@ -18,12 +15,8 @@ mod small;
 mod statistics;
 mod writer;
 
-pub use decode::{Message, decode};
-pub use decode_error::DecodeError;
 pub use forces::Forces;
-pub use frame::{
-    Bounds, Format, Frame, FrameHead, FrameLimits, encode as encode_frame, frame_flag,
-};
+pub use frame::{Bounds, Format, FrameHead, FrameLimits, encode as encode_frame, frame_flag};
 pub use ghost::Ghost;
 pub use header::{KIND_VERSION, Kind, Stamp};
 pub use part::Part;

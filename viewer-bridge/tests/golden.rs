@@ -17,10 +17,12 @@ use sim_contract::{
 };
 use sim_solver::scene::ColliderMesh;
 use viewer_bridge::wire::{
-    Bounds, Colliders, Forces, Format, FrameHead, FrameLimits, Ghost, Inspected, Message, Part,
-    Past, Percentiles, Pins, Scene, SceneText, ShapeText, Speeds, Stamp, Statistics, Tear, decode,
-    encode_frame, frame_flag, scene_flag,
+    Bounds, Colliders, Forces, Format, FrameHead, FrameLimits, Ghost, Inspected, Part, Past,
+    Percentiles, Pins, Scene, SceneText, ShapeText, Speeds, Stamp, Statistics, Tear, encode_frame,
+    frame_flag, scene_flag,
 };
+
+use crate::wire_decoder::{Message, decode};
 
 const STAMP: Stamp = Stamp { epoch: 3, step: 1200 };
 

@@ -9,3 +9,4 @@
 mod decoder;
 mod golden;
 mod sockets;
+mod wire_decoder;

@@ -2,9 +2,9 @@
 
 use integration_tests::{Process, Program, Sandbox};
 use serde_json::json;
-use viewer_bridge::wire::Message;
 
 use super::page::{Bridge, Page};
+use crate::wire_decoder::Message;
 
 /// A ball that rises, and a particle on an anchor, at rest 1 m above the origin.
 const SCENE: &str = "

@@ -9,9 +9,10 @@ use integration_tests::{Process, Program, Sandbox};
 use recording::{Closing, FrameReader, LogOptions, LogReader, LogWriter, Message as Logged};
 use serde_json::{Value, json};
 use sim_contract::ParticleState;
-use viewer_bridge::wire::{Ghost, Message};
+use viewer_bridge::wire::Ghost;
 
 use super::page::{Bridge, Page};
+use crate::wire_decoder::Message;
 
 const STEPS: u64 = 480;
 /// The commands of the changed recording.

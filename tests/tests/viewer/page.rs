@@ -6,7 +6,9 @@ use std::net::TcpStream;
 use integration_tests::{DEADLINE, Deadline, Process, Program, Sandbox};
 use serde_json::{Value, json};
 use tungstenite::{Message, WebSocket};
-use viewer_bridge::wire::{self, Frame, Pins, Scene, Statistics, Tear, decode};
+use viewer_bridge::wire::{Pins, Scene, Statistics, Tear};
+
+use crate::wire_decoder::{Frame, Message as Binary, decode};
 
 /// A bridge and its address.
 pub(crate) struct Bridge {
@@ -102,7 +104,7 @@ impl Page {
     pub(crate) fn receive<T>(
         &mut self,
         what: &str,
-        mut accept: impl FnMut(wire::Message) -> Option<T>,
+        mut accept: impl FnMut(Binary) -> Option<T>,
     ) -> T {
         let deadline = Deadline::start();
         loop {
@@ -110,7 +112,7 @@ impl Page {
             match self.socket.read().unwrap() {
                 Message::Binary(bytes) => {
                     let message = decode(&bytes).unwrap();
-                    if let wire::Message::Frame(frame) = &message {
+                    if let Binary::Frame(frame) = &message {
                         self.send(&json!({ "type": "ack", "frame": frame.head.number }));
                     }
                     if let Some(value) = accept(message) {
@@ -136,7 +138,7 @@ impl Page {
             match self.socket.read().unwrap() {
                 Message::Text(text) => self.texts.push_back(serde_json::from_str(&text).unwrap()),
                 Message::Binary(bytes) => {
-                    if let Ok(wire::Message::Frame(frame)) = decode(&bytes) {
+                    if let Ok(Binary::Frame(frame)) = decode(&bytes) {
                         self.send(&json!({ "type": "ack", "frame": frame.head.number }));
                     }
                 }
@@ -152,21 +154,21 @@ impl Page {
 
     pub(crate) fn scene(&mut self) -> Scene {
         self.receive("a scene", |message| match message {
-            wire::Message::Scene(scene) => Some(*scene),
+            Binary::Scene(scene) => Some(*scene),
             _ => None,
         })
     }
 
     pub(crate) fn pins(&mut self) -> Pins {
         self.receive("pins", |message| match message {
-            wire::Message::Pins(pins) => Some(pins),
+            Binary::Pins(pins) => Some(pins),
             _ => None,
         })
     }
 
     pub(crate) fn tear(&mut self) -> Tear {
         self.receive("a tear", |message| match message {
-            wire::Message::Tear(tear) => Some(tear),
+            Binary::Tear(tear) => Some(tear),
             _ => None,
         })
     }
@@ -174,7 +176,7 @@ impl Page {
     /// Waits for the next statistics that match.
     pub(crate) fn statistics(&mut self, matches: impl Fn(&Statistics) -> bool) -> Statistics {
         self.receive("statistics", |message| match message {
-            wire::Message::Statistics(statistics) => Some(*statistics).filter(&matches),
+            Binary::Statistics(statistics) => Some(*statistics).filter(&matches),
             _ => None,
         })
     }
@@ -182,7 +184,7 @@ impl Page {
     /// Waits for the next frame that matches.
     pub(crate) fn frame(&mut self, matches: impl Fn(&Frame) -> bool) -> Frame {
         self.receive("a frame", |message| match message {
-            wire::Message::Frame(frame) => Some(frame).filter(&matches),
+            Binary::Frame(frame) => Some(frame).filter(&matches),
             _ => None,
         })
     }

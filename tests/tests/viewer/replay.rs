@@ -13,11 +13,12 @@ use sim_contract::{ParticleFlags, Stop};
 use viewer_bridge::request::requests;
 use viewer_bridge::sink::{Demand, Sink, Update};
 use viewer_bridge::source::replay::{GhostChoice, InitialPlayback, Replay};
+use viewer_bridge::wire::FlaggedParticle;
 use viewer_bridge::wire::frame_flag::PAUSED;
-use viewer_bridge::wire::{FlaggedParticle, Message};
 use viewer_bridge::{Shutdown, Sinks, Source};
 
 use super::page::{Bridge, Page};
+use crate::wire_decoder::Message;
 
 const STEPS: u64 = 960;
 /// Cuts, pins and parameters before and after a reset. Two later commands share the step of a reset.

@@ -217,7 +217,7 @@ mod tests {
     use sim_contract::TornConstraint;
 
     use super::*;
-    use crate::wire::{Message, decode};
+    use crate::wire_decoder::{Message, decode};
 
     static NO_WISHES: Wishes = Wishes { forces: false, speeds: false, particles: Vec::new() };
     const PAGE: Viewer<'static> = Viewer { choice: Choice::Auto, wishes: &NO_WISHES };

@@ -4,8 +4,6 @@ use bytemuck::bytes_of;
 use bytes::Bytes;
 use sim_contract::ForceRow;
 
-use super::cursor::Cursor;
-use super::decode_error::DecodeError;
 use super::header::{Kind, Stamp};
 use super::writer::Writer;
 
@@ -29,13 +27,5 @@ impl Forces {
         writer.u32(self.rate_hz);
         self.rows.iter().for_each(|row| writer.bytes(bytes_of(row)));
         writer.finish()
-    }
-
-    pub(super) fn decode(stamp: Stamp, cursor: &mut Cursor<'_>) -> Result<Self, DecodeError> {
-        let (count, rate_hz) = (cursor.u32()?, cursor.u32()?);
-        let size = size_of::<ForceRow>();
-        let rows = cursor
-            .list(count, size, |cursor| Ok(bytemuck::pod_read_unaligned(cursor.bytes(size)?)))?;
-        Ok(Self { stamp, rate_hz, rows })
     }
 }

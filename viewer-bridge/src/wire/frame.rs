@@ -3,8 +3,6 @@
 use bytes::Bytes;
 use sim_contract::ParticleState;
 
-use super::cursor::Cursor;
-use super::decode_error::DecodeError;
 use super::header::{Kind, Stamp};
 use super::writer::Writer;
 
@@ -194,55 +192,4 @@ fn put_u16(bytes: &mut [u8], particles: &[ParticleState], lo: [f32; 3], scale: [
 )]
 fn quantised(steps: f32) -> u16 {
     (steps + 0.5) as u16
-}
-
-/// A decoded frame.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Frame {
-    /// Encoding of the positions.
-    pub format: Format,
-    /// Everything except the positions.
-    pub head: FrameHead,
-    /// Lower corner of the box.
-    pub lo: [f32; 3],
-    /// Size of a step along each axis.
-    pub scale: [f32; 3],
-    /// The positions; u16 values are converted to coordinates.
-    pub positions: Vec<[f32; 3]>,
-    /// Particles whose position is not finite.
-    pub not_finite: Vec<u32>,
-}
-
-pub(super) fn decode(
-    format: Format,
-    stamp: Stamp,
-    cursor: &mut Cursor<'_>,
-) -> Result<Frame, DecodeError> {
-    let sim_time_s = cursor.f64()?;
-    let (count, flags) = (cursor.u32()?, cursor.u32()?);
-    let (lo, scale) = (cursor.vector()?, cursor.vector()?);
-    let (not_finite_count, torn_count) = (cursor.u32()?, cursor.u32()?);
-    let (solve_us, wake_late_us) = (cursor.f32()?, cursor.f32()?);
-    let (number, _spare) = (cursor.u32()?, cursor.u32()?);
-    let publish_monotonic_ns = cursor.u64()?;
-    let head = FrameHead {
-        stamp,
-        sim_time_s,
-        flags,
-        torn_count,
-        solve_us,
-        wake_late_us,
-        number,
-        publish_monotonic_ns,
-    };
-    let positions = match format {
-        Format::F32 => cursor.list(count, 12, Cursor::vector)?,
-        Format::U16 => cursor.list(count, 6, |cursor| {
-            let steps = [cursor.u16()?, cursor.u16()?, cursor.u16()?];
-            Ok(std::array::from_fn(|axis| lo[axis] + scale[axis] * f32::from(steps[axis])))
-        })?,
-    };
-    cursor.pad()?;
-    let not_finite = cursor.list(not_finite_count, 4, Cursor::u32)?;
-    Ok(Frame { format, head, lo, scale, positions, not_finite })
 }

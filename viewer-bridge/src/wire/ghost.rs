@@ -2,8 +2,6 @@
 
 use bytes::Bytes;
 
-use super::cursor::Cursor;
-use super::decode_error::DecodeError;
 use super::header::{Kind, Stamp};
 use super::writer::Writer;
 
@@ -34,13 +32,5 @@ impl Ghost {
         self.positions.iter().for_each(|position| writer.vector(*position));
         self.hidden.iter().for_each(|constraint| writer.u32(*constraint));
         writer.finish()
-    }
-
-    pub(super) fn decode(stamp: Stamp, cursor: &mut Cursor<'_>) -> Result<Self, DecodeError> {
-        let (count, hidden_count) = (cursor.u32()?, cursor.u32()?);
-        let (farthest, distance) = (cursor.u32()?, cursor.f32()?);
-        let positions = cursor.list(count, 12, Cursor::vector)?;
-        let hidden = cursor.list(hidden_count, 4, Cursor::u32)?;
-        Ok(Self { stamp, farthest, distance, positions, hidden })
     }
 }

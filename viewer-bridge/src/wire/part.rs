@@ -7,8 +7,6 @@ use bytes::Bytes;
 use flate2::Compression;
 use flate2::write::DeflateEncoder;
 
-use super::cursor::Cursor;
-use super::decode_error::DecodeError;
 use super::header::{Kind, Stamp};
 use super::writer::Writer;
 use crate::limits::PART_SIZE_BYTES;
@@ -66,13 +64,6 @@ impl Part {
         writer.pad();
         writer.finish()
     }
-
-    pub(super) fn decode(stamp: Stamp, cursor: &mut Cursor<'_>) -> Result<Self, DecodeError> {
-        let [kind, offset, size, unpacked_size, count] =
-            [cursor.u32()?, cursor.u32()?, cursor.u32()?, cursor.u32()?, cursor.u32()?];
-        let bytes = cursor.padded(count)?.into();
-        Ok(Self { stamp, kind, offset, size, unpacked_size, bytes })
-    }
 }
 
 /// Compresses a message. Returns `None` if that does not make it smaller.
@@ -90,7 +81,8 @@ mod tests {
     use flate2::read::DeflateDecoder;
 
     use super::*;
-    use crate::wire::{Message, Scene, decode};
+    use crate::wire::Scene;
+    use crate::wire_decoder::{Message, decode};
 
     fn joined(parts: &[Part]) -> Vec<u8> {
         parts.iter().flat_map(|part| part.bytes.to_vec()).collect()

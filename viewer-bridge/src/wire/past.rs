@@ -2,8 +2,6 @@
 
 use bytes::Bytes;
 
-use super::cursor::Cursor;
-use super::decode_error::DecodeError;
 use super::header::{Kind, Stamp};
 use super::writer::Writer;
 use crate::wire::convert::count_u32;
@@ -24,10 +22,5 @@ impl Past {
         writer.u32(count_u32(self.count));
         writer.u32(0);
         writer.finish()
-    }
-
-    pub(super) fn decode(stamp: Stamp, cursor: &mut Cursor<'_>) -> Result<Self, DecodeError> {
-        let (count, _reserved) = (cursor.u32()?, cursor.u32()?);
-        Ok(Self { stamp, count: count as usize })
     }
 }

@@ -5,8 +5,6 @@ use serde::{Deserialize, Serialize};
 use sim_contract::{ConstraintState, ParticleState, Triangle};
 use sim_solver::scene::{ColliderMesh, ColliderMeshes};
 
-use super::cursor::Cursor;
-use super::decode_error::DecodeError;
 use super::frame::Bounds;
 use super::header::{Kind, Stamp};
 use super::writer::Writer;
@@ -147,46 +145,6 @@ impl Scene {
         self.compliances.iter().for_each(|compliance| writer.f32(*compliance));
         writer.finish()
     }
-
-    pub(super) fn decode(stamp: Stamp, cursor: &mut Cursor<'_>) -> Result<Self, DecodeError> {
-        let (particles, constraints, triangles) = (cursor.u32()?, cursor.u32()?, cursor.u32()?);
-        let flags = cursor.u32()?;
-        let _bounds = (cursor.vector()?, cursor.vector()?);
-        let (rate_hz, json_size) = (cursor.u32()?, cursor.u32()?);
-        let origin = [cursor.f64()?, cursor.f64()?, cursor.f64()?];
-        Ok(Self {
-            stamp,
-            flags,
-            rate_hz,
-            origin,
-            positions: cursor.list(particles, 12, Cursor::vector)?,
-            ends: cursor.list(constraints, 8, |cursor| Ok([cursor.u32()?, cursor.u32()?]))?,
-            rest_lengths: cursor.list(constraints, 4, Cursor::f32)?,
-            triangles: cursor
-                .list(triangles, 12, |cursor| Ok([cursor.u32()?, cursor.u32()?, cursor.u32()?]))?,
-            kinds: cursor.padded(constraints)?,
-            text: serde_json::from_slice(&cursor.padded(json_size)?)
-                .map_err(|error| DecodeError::Json { detail: error.to_string() })?,
-            collider_meshes: decode_meshes(cursor)?,
-            compliances: cursor.list(constraints, 4, Cursor::f32)?,
-        })
-    }
-}
-
-fn decode_meshes(cursor: &mut Cursor<'_>) -> Result<ColliderMeshes, DecodeError> {
-    let mut meshes = ColliderMeshes::new();
-    for _ in 0..cursor.u32()? {
-        let (collider, vertices, triangles) = (cursor.u32()?, cursor.u32()?, cursor.u32()?);
-        let mesh = ColliderMesh {
-            vertices: cursor.list(vertices, 12, Cursor::vector)?,
-            triangles: cursor
-                .list(triangles, 12, |cursor| Ok([cursor.u32()?, cursor.u32()?, cursor.u32()?]))?,
-            // The page does not need it.
-            is_solid: false,
-        };
-        meshes.insert(collider as usize, mesh);
-    }
-    Ok(meshes)
 }
 
 fn mesh_size_bytes(mesh: &ColliderMesh) -> usize {

@@ -3,8 +3,6 @@
 use bytes::Bytes;
 use sim_contract::ParticleState;
 
-use super::cursor::Cursor;
-use super::decode_error::DecodeError;
 use super::header::{Kind, Stamp};
 use super::writer::Writer;
 
@@ -57,11 +55,6 @@ impl Speeds {
         self.speeds.iter().for_each(|speed| writer.f32(*speed));
         writer.finish()
     }
-
-    pub(super) fn decode(stamp: Stamp, cursor: &mut Cursor<'_>) -> Result<Self, DecodeError> {
-        let (count, _reserved) = (cursor.u32()?, cursor.u32()?);
-        Ok(Self { stamp, speeds: cursor.list(count, 4, Cursor::f32)? })
-    }
 }
 
 impl Inspected {
@@ -92,18 +85,5 @@ impl Inspected {
             writer.f32(one.inverse_mass);
         }
         writer.finish()
-    }
-
-    pub(super) fn decode(stamp: Stamp, cursor: &mut Cursor<'_>) -> Result<Self, DecodeError> {
-        let (count, _reserved) = (cursor.u32()?, cursor.u32()?);
-        let particles = cursor.list(count, ROW_SIZE_BYTES, |cursor| {
-            Ok(InspectedParticle {
-                particle: cursor.u32()?,
-                position: cursor.vector()?,
-                velocity: cursor.vector()?,
-                inverse_mass: cursor.f32()?,
-            })
-        })?;
-        Ok(Self { stamp, particles })
     }
 }

@@ -4,8 +4,6 @@ use bytemuck::bytes_of;
 use bytes::Bytes;
 use sim_contract::{ColliderState, ParticleState, TornConstraint};
 
-use super::cursor::Cursor;
-use super::decode_error::DecodeError;
 use super::header::{Kind, Stamp};
 use super::writer::Writer;
 
@@ -35,18 +33,6 @@ impl Tear {
     /// The constraints after the kept entries, without their causes.
     pub fn constraints(&self) -> Vec<u32> {
         self.torn.iter().map(|torn| torn.constraint).collect()
-    }
-
-    pub(super) fn decode(stamp: Stamp, cursor: &mut Cursor<'_>) -> Result<Self, DecodeError> {
-        let (first, count) = (cursor.u32()?, cursor.u32()?);
-        let constraints = cursor.list(count, 4, Cursor::u32)?;
-        let causes = cursor.padded(count)?;
-        let torn = constraints.into_iter().zip(causes);
-        let torn = torn.map(|(constraint, cause)| TornConstraint {
-            constraint,
-            cause: if cause == u8::MAX { u32::MAX } else { cause.into() },
-        });
-        Ok(Self { stamp, first, torn: torn.collect() })
     }
 }
 
@@ -93,14 +79,6 @@ impl Pins {
         }
         writer.finish()
     }
-
-    pub(super) fn decode(stamp: Stamp, cursor: &mut Cursor<'_>) -> Result<Self, DecodeError> {
-        let (count, _reserved) = (cursor.u32()?, cursor.u32()?);
-        let particles = cursor.list(count, 8, |cursor| {
-            Ok(FlaggedParticle { particle: cursor.u32()?, flags: cursor.u32()? })
-        })?;
-        Ok(Self { stamp, particles })
-    }
 }
 
 /// All colliders.
@@ -121,13 +99,5 @@ impl Colliders {
         writer.u32(0);
         self.colliders.iter().for_each(|collider| writer.bytes(bytes_of(collider)));
         writer.finish()
-    }
-
-    pub(super) fn decode(stamp: Stamp, cursor: &mut Cursor<'_>) -> Result<Self, DecodeError> {
-        let (count, _reserved) = (cursor.u32()?, cursor.u32()?);
-        let size = size_of::<ColliderState>();
-        let colliders = cursor
-            .list(count, size, |cursor| Ok(bytemuck::pod_read_unaligned(cursor.bytes(size)?)))?;
-        Ok(Self { stamp, colliders })
     }
 }

@@ -2,8 +2,6 @@
 
 use bytes::Bytes;
 
-use super::cursor::Cursor;
-use super::decode_error::DecodeError;
 use super::header::{Kind, Stamp};
 use super::writer::Writer;
 
@@ -106,35 +104,5 @@ impl Statistics {
         writer.u32(self.flags);
         writer.u32(0);
         writer.finish()
-    }
-
-    pub(super) fn decode(stamp: Stamp, cursor: &mut Cursor<'_>) -> Result<Self, DecodeError> {
-        // The fields are evaluated in the order of this list.
-        let statistics = Self {
-            stamp,
-            solve_us: Percentiles { p50: cursor.f32()?, p99: cursor.f32()? },
-            wake_late_us: Percentiles { p50: cursor.f32()?, p99: cursor.f32()? },
-            period_us: cursor.f32()?,
-            real_time_factor: cursor.f32()?,
-            time_scale: cursor.f32()?,
-            stretch_mean: cursor.f32()?,
-            stretch_max: cursor.f32()?,
-            stretch_max_constraint: cursor.u32()?,
-            kinetic_j: cursor.f64()?,
-            potential_j: cursor.f64()?,
-            late_steps: cursor.u64()?,
-            skipped_periods: cursor.u64()?,
-            outcome_count: cursor.u64()?,
-            rejected_count: cursor.u64()?,
-            frozen_count: cursor.u32()?,
-            torn_count: cursor.u32()?,
-            reader_count: cursor.u32()?,
-            client_count: cursor.u32()?,
-            encode_us: cursor.f32()?,
-            frames_per_second: cursor.f32()?,
-            flags: cursor.u32()?,
-        };
-        let _reserved = cursor.u32()?;
-        Ok(statistics)
     }
 }

@@ -10,9 +10,10 @@ use viewer_bridge::pages::hub::Formats;
 use viewer_bridge::request::{ClientId, Request, RequestKind};
 use viewer_bridge::sink::Update;
 use viewer_bridge::wire::Format::{F32, U16};
-use viewer_bridge::wire::{Message, Scene, frame_flag};
+use viewer_bridge::wire::{Scene, frame_flag};
 
 use crate::sockets::support::{Site, wait_for};
+use crate::wire_decoder::{Message, decode};
 
 /// Limit on the wait for a request of a page.
 const REQUEST_TIMEOUT: Duration = Duration::from_mins(1);
@@ -200,7 +201,7 @@ fn a_frame_never_precedes_its_scene() {
         let mut is_over = false;
         while !is_over {
             match page.next().unwrap() {
-                tungstenite::Message::Binary(bytes) => match viewer_bridge::wire::decode(&bytes) {
+                tungstenite::Message::Binary(bytes) => match decode(&bytes) {
                     Ok(Message::Scene(scene)) => epoch = scene.stamp.epoch,
                     Ok(Message::Frame(frame)) => {
                         assert!(frame.head.stamp.epoch <= epoch, "frame before scene");

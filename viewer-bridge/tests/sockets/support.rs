@@ -22,8 +22,10 @@ use viewer_bridge::request::{Requests, requests};
 use viewer_bridge::scene::catalog::Catalog;
 use viewer_bridge::sink::{State, Update};
 use viewer_bridge::source::shown_state::ShownState;
-use viewer_bridge::wire::{self, Scene, decode};
+use viewer_bridge::wire::Scene;
 use viewer_bridge::{Hub, Replays, Server, ServerOptions, Shutdown, Sinks, TokenDemand};
+
+use crate::wire_decoder::{self, decode};
 
 /// Limit on every wait. It is generous, because the machine may be busy.
 const DEADLINE: Duration = Duration::from_mins(1);
@@ -233,7 +235,7 @@ impl Page {
     }
 
     /// Waits for the next binary message, and skips texts.
-    pub(crate) fn binary(&mut self) -> wire::Message {
+    pub(crate) fn binary(&mut self) -> wire_decoder::Message {
         loop {
             if let Message::Binary(bytes) = self.next().unwrap() {
                 return decode(&bytes).unwrap();
@@ -244,7 +246,7 @@ impl Page {
     /// Waits for the next frame, and returns its step and number.
     pub(crate) fn frame(&mut self) -> (u64, u32) {
         loop {
-            if let wire::Message::Frame(frame) = self.binary() {
+            if let wire_decoder::Message::Frame(frame) = self.binary() {
                 return (frame.head.stamp.step, frame.head.number);
             }
         }

@@ -22,7 +22,7 @@ use crate::pages::hub::Hub;
 use crate::request::{ClientId, Request, RequestKind, Requests, requests};
 use crate::sink::{Demand, Sink, Sinks, Update};
 use crate::source::shown_state::ShownState;
-use crate::wire::{Message as Wire, decode};
+use crate::wire_decoder::{Message as Wire, decode};
 
 const RUN_ID: u64 = 7;
 const PAGE: ClientId = ClientId::Page(1);
