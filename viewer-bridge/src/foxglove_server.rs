@@ -4,19 +4,15 @@
 //! Parameters, service calls and published commands become requests to the source, like the commands
 //! of pages.
 
-mod client_events;
-mod options;
-mod parameter_requests;
+mod callbacks;
 mod parameters;
 mod playback;
 mod proxy;
 mod publisher;
 mod request_bridge;
 mod server;
-mod services;
 mod sink;
 #[cfg(test)]
 mod tests;
 
-pub use options::{FoxgloveOptions, FoxglovePermission, FoxgloveServerError};
-pub use server::FoxgloveServer;
+pub use server::{FoxgloveOptions, FoxglovePermission, FoxgloveServer, FoxgloveServerError};

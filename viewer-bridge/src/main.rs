@@ -21,7 +21,7 @@ use viewer_bridge::request::requests;
 use viewer_bridge::scene::catalog::Catalog;
 use viewer_bridge::source::live::Live;
 use viewer_bridge::source::replay::Replay;
-use viewer_bridge::source::thread::start_source;
+use viewer_bridge::source::start_source;
 use viewer_bridge::{
     FoxgloveOptions, FoxgloveServer, Hub, Recordings, Replays, Server, ServerOptions, Shutdown,
     Sinks, Source, newest_recording, open_files_warning,

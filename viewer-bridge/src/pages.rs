@@ -2,8 +2,7 @@
 
 pub mod assets;
 pub(crate) mod connection;
-mod frame_encoder;
-mod frame_set;
+mod frames;
 mod history;
 pub mod hub;
 pub mod recordings;

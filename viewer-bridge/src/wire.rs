@@ -2,26 +2,20 @@
 //!
 //! All numbers are little-endian. Every array begins at a multiple of four bytes.
 
-pub(crate) mod convert;
-mod forces;
 mod frame;
-mod ghost;
-mod header;
+mod lists;
 mod part;
-mod past;
 mod scene;
-mod selected;
-mod small;
 mod statistics;
 mod writer;
 
-pub use forces::Forces;
 pub use frame::{Bounds, Format, FrameHead, FrameLimits, encode as encode_frame, frame_flag};
-pub use ghost::Ghost;
-pub use header::{KIND_VERSION, Kind, Stamp};
+pub use lists::{
+    Colliders, FlaggedParticle, Forces, Ghost, Inspected, InspectedParticle, Past, Pins, Speeds,
+    Tear,
+};
 pub use part::Part;
-pub use past::Past;
 pub use scene::{Scene, SceneText, ShapeText, scene_flag};
-pub use selected::{Inspected, InspectedParticle, Speeds};
-pub use small::{Colliders, FlaggedParticle, Pins, Tear};
 pub use statistics::{Percentiles, Statistics, statistics_flag};
+pub use writer::{KIND_VERSION, Kind, Stamp};
+pub(crate) use writer::{count_u32, microseconds, to_f32};

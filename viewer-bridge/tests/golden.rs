@@ -289,12 +289,12 @@ fn fields(message: &Message) -> Value {
             "farthest": ghost.farthest, "distance": ghost.distance,
             "positions": ghost.positions, "hidden": ghost.hidden,
         }),
-        wish => wished_fields(wish),
+        subscribed => subscribed_fields(subscribed),
     }
 }
 
 /// The fields of a message that a page asks for.
-fn wished_fields(message: &Message) -> Value {
+fn subscribed_fields(message: &Message) -> Value {
     match message {
         Message::Forces(all) => json!({
             "kind": 8, "epoch": all.stamp.epoch, "step": all.stamp.step, "rate_hz": all.rate_hz,

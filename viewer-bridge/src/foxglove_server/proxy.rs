@@ -22,8 +22,8 @@ use tokio_tungstenite::{WebSocketStream, client_async_with_config};
 
 use crate::limits::{CLIENTS_MAX, CONNECTION_TIMEOUT, SILENCE_MAX};
 use crate::socket::listen::ClientPermits;
-use crate::socket::lobby::Place;
 use crate::socket::peer::{End, FULL, GOING_AWAY, Peer, TOO_SLOW, limit};
+use crate::socket::pending_connections::Place;
 
 /// Forwards messages between clients and the library.
 #[derive(Debug)]
@@ -110,7 +110,7 @@ struct Forwarding {
 
 impl Forwarding {
     /// Forwards messages in both directions until one side ends. The connection keeps its place in the
-    /// lobby until it is a client.
+    /// pending connections until it is a client.
     async fn run(mut self, place: Arc<Place>, clients: &ClientPermits) {
         match place.while_held(self.admit(clients)).await {
             Some(Ok(_permit)) => {

@@ -8,7 +8,7 @@ use axum::extract::ws::Message;
 use bytes::Bytes;
 use tokio::sync::{mpsc, watch};
 
-use super::frame_set::FrameSet;
+use super::frames::FrameSet;
 use crate::limits::FRAMES_UNACKNOWLEDGED_MAX;
 use crate::message::Choice;
 use crate::request::ClientId;
@@ -31,7 +31,7 @@ impl Credit {
 
 /// Values besides the positions that a page has asked for.
 #[derive(Debug, Default)]
-pub(crate) struct Wishes {
+pub(crate) struct Subscription {
     /// The forces of each step.
     pub(crate) forces: bool,
     /// The speeds of all particles.
@@ -40,8 +40,8 @@ pub(crate) struct Wishes {
     pub(crate) particles: Vec<u32>,
 }
 
-impl Wishes {
-    /// Returns the messages of a frame that fulfil them.
+impl Subscription {
+    /// Returns the subscribed messages of a frame.
     pub(super) fn select(&self, frame: &FrameSet) -> impl Iterator<Item = Bytes> + use<> {
         let forces = frame.forces.clone().filter(|_| self.forces);
         let speeds = frame.speeds.clone().filter(|_| self.speeds);
@@ -59,7 +59,7 @@ pub(crate) struct Connection {
     pub(crate) queue: mpsc::Receiver<Message>,
     pub(crate) frames: watch::Receiver<Arc<FrameSet>>,
     pub(super) credit: Arc<Credit>,
-    pub(super) wishes: Arc<Mutex<Wishes>>,
+    pub(super) subscription: Arc<Mutex<Subscription>>,
     pub(super) sent: SentFrames,
 }
 
@@ -102,7 +102,7 @@ impl Connection {
             Format::F32 => &frame.f32,
             Format::U16 => &frame.u16,
         };
-        let wished = self.wished(&frame);
+        let subscribed = self.subscribed(&frame);
         let sent = &mut self.sent;
         if sent.newest == Some(frame.number) || (frame.f32.is_none() && frame.u16.is_none()) {
             return NextFrame::Nothing;
@@ -117,7 +117,7 @@ impl Connection {
             messages.push(colliders.bytes.clone());
         }
         messages.extend(frame.ghost.clone());
-        messages.extend(wished);
+        messages.extend(subscribed);
         messages.push(encoded.clone());
         sent.unacknowledged.push_back(frame.number);
         self.credit.set_used(sent.unacknowledged.len());
@@ -125,13 +125,13 @@ impl Connection {
     }
 
     /// Returns the messages of a frame that the page has asked for.
-    fn wished(&self, frame: &FrameSet) -> impl Iterator<Item = Bytes> + use<> {
-        self.wishes.lock().unwrap_or_else(PoisonError::into_inner).select(frame)
+    fn subscribed(&self, frame: &FrameSet) -> impl Iterator<Item = Bytes> + use<> {
+        self.subscription.lock().unwrap_or_else(PoisonError::into_inner).select(frame)
     }
 
-    /// Changes the wishes of the page.
-    pub(crate) fn with_wishes(&self, change: impl FnOnce(&mut Wishes)) {
-        change(&mut self.wishes.lock().unwrap_or_else(PoisonError::into_inner));
+    /// Changes the subscription of the page.
+    pub(crate) fn change_subscription(&self, change: impl FnOnce(&mut Subscription)) {
+        change(&mut self.subscription.lock().unwrap_or_else(PoisonError::into_inner));
     }
 
     /// Notes that the page has drawn a frame.

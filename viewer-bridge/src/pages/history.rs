@@ -6,8 +6,8 @@ use std::sync::Arc;
 use bytes::Bytes;
 use recording::OutcomeRow;
 
-use super::connection::Wishes;
-use super::frame_set::FrameSet;
+use super::connection::Subscription;
+use super::frames::FrameSet;
 use crate::limits::{HISTORY_MARKS_MAX, HISTORY_SIZE_BYTES_MAX, HISTORY_STATES_MAX};
 use crate::message::{Choice, HistoryText, Mark, MarkKind, Toward};
 use crate::wire::{Format, Past, Pins, Stamp, Tear};
@@ -180,7 +180,7 @@ impl History {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Viewer<'a> {
     pub(super) choice: Choice,
-    pub(super) wishes: &'a Wishes,
+    pub(super) subscription: &'a Subscription,
 }
 
 impl Around {
@@ -205,7 +205,7 @@ impl PastState {
         let positions = wanted.clone().or_else(|| other.clone());
         let around = [Some(tear), Some(pins), colliders].into_iter().flatten();
         let mut messages: Vec<_> =
-            around.chain(page.wishes.select(frame)).chain(positions).collect();
+            around.chain(page.subscription.select(frame)).chain(positions).collect();
         messages.insert(0, Past { stamp: *stamp, count: messages.len() }.encode());
         PastMessages { step: stamp.step, messages }
     }
@@ -219,8 +219,9 @@ mod tests {
     use super::*;
     use crate::wire_decoder::{Message, decode};
 
-    static NO_WISHES: Wishes = Wishes { forces: false, speeds: false, particles: Vec::new() };
-    const PAGE: Viewer<'static> = Viewer { choice: Choice::Auto, wishes: &NO_WISHES };
+    static NO_SUBSCRIPTION: Subscription =
+        Subscription { forces: false, speeds: false, particles: Vec::new() };
+    const PAGE: Viewer<'static> = Viewer { choice: Choice::Auto, subscription: &NO_SUBSCRIPTION };
 
     /// A frame whose positions take `size_bytes`.
     fn frame(step: u64, size_bytes: usize) -> Arc<FrameSet> {

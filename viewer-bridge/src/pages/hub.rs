@@ -14,10 +14,10 @@ use bytes::Bytes;
 use sim_contract::Reason;
 use tokio::sync::{mpsc, watch};
 
-use super::connection::{Connection, Credit, SentFrames, Wishes};
-use super::frame_encoder::{FrameEncoder, Wanted};
-pub use super::frame_set::Formats;
-use super::frame_set::{FrameProperties, FrameSet};
+use super::connection::{Connection, Credit, SentFrames, Subscription};
+pub use super::frames::Formats;
+use super::frames::{FrameEncoder, Wanted};
+use super::frames::{FrameProperties, FrameSet};
 use super::history::{History, PastMessages, Viewer};
 use crate::limits::{PROTOCOL, RELIABLE_QUEUED_MAX};
 use crate::message::{
@@ -27,7 +27,7 @@ use crate::request::{ClientId, RequestKind, RequestSender};
 use crate::scene::catalog::SceneEntry;
 use crate::sink::{Demand, Sink, State, Torn, Update};
 use crate::source::recording_files::names_in;
-use crate::wire::convert::count_u32;
+use crate::wire::count_u32;
 use crate::wire::{Stamp, Statistics, Tear};
 
 /// Latched messages, in the order in which a new page receives them.
@@ -78,7 +78,7 @@ struct Page {
     queue: mpsc::Sender<Message>,
     choice: Choice,
     credit: Arc<Credit>,
-    wishes: Arc<Mutex<Wishes>>,
+    subscription: Arc<Mutex<Subscription>>,
     /// Latched messages that this page has missed, because its queue was half full.
     missed: BTreeSet<Slot>,
 }
@@ -169,9 +169,9 @@ impl Hub {
     fn wanted(&self) -> Wanted {
         let mut wanted = Wanted::default();
         for page in lock(&self.state).pages.values() {
-            let wishes = lock(&page.wishes);
-            wanted.speeds |= wishes.speeds;
-            wanted.particles.extend(&wishes.particles);
+            let subscription = lock(&page.subscription);
+            wanted.speeds |= subscription.speeds;
+            wanted.particles.extend(&subscription.particles);
         }
         wanted.particles.sort_unstable();
         wanted.particles.dedup();
@@ -252,8 +252,8 @@ impl Hub {
         if self.mode != Mode::Live {
             return Err(Refusal::OnlyLive);
         }
-        let wishes = lock(&page.wishes);
-        let viewer = Viewer { choice: page.choice, wishes: &wishes };
+        let subscription = lock(&page.subscription);
+        let viewer = Viewer { choice: page.choice, subscription: &subscription };
         lock(&self.history).find(step, toward, viewer).ok_or(Reason::UnknownStep.into())
     }
 
@@ -297,10 +297,11 @@ impl Hub {
             // The queue has room for all of them.
             let _queued = queue.try_send(message.clone());
         }
-        let wishes = Arc::new(Mutex::new(Wishes::default()));
-        let (seen_credit, seen_wishes) = (Arc::clone(&credit), Arc::clone(&wishes));
+        let subscription = Arc::new(Mutex::new(Subscription::default()));
+        let (seen_credit, seen_subscription) = (Arc::clone(&credit), Arc::clone(&subscription));
         let missed = BTreeSet::new();
-        let page = Page { queue, choice, credit: seen_credit, wishes: seen_wishes, missed };
+        let page =
+            Page { queue, choice, credit: seen_credit, subscription: seen_subscription, missed };
         state.pages.insert(client, page);
         state.queue_count();
         drop(state);
@@ -308,7 +309,7 @@ impl Hub {
         frames.mark_unchanged();
         self.request(client, RequestKind::State);
         let sent = SentFrames::default();
-        Connection { client, choice, queue: receiver, frames, credit, wishes, sent }
+        Connection { client, choice, queue: receiver, frames, credit, subscription, sent }
     }
 
     fn welcome(&self, client: u32, format: Choice, recordings: Vec<String>) -> Welcome {
@@ -351,7 +352,7 @@ impl Sink for Hub {
             Demand::State => lock(&self.state).pages.values().any(|page| page.credit.is_left()),
             Demand::Statistics => self.client_count() > 0,
             Demand::Forces => {
-                lock(&self.state).pages.values().any(|page| lock(&page.wishes).forces)
+                lock(&self.state).pages.values().any(|page| lock(&page.subscription).forces)
             }
         }
     }
@@ -418,7 +419,7 @@ mod tests {
             queue,
             choice: Choice::default(),
             credit: Arc::default(),
-            wishes: Arc::default(),
+            subscription: Arc::default(),
             missed: BTreeSet::new(),
         };
         let pages = BTreeMap::from([(ClientId::Page(1), page)]);

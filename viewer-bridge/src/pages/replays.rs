@@ -18,7 +18,7 @@ use crate::sink::Sinks;
 use crate::source::Source;
 use crate::source::recording_files::path_of;
 use crate::source::replay::{GhostChoice, InitialPlayback, Replay};
-use crate::source::thread::start_source;
+use crate::source::start_source;
 
 /// The open recordings of a folder.
 #[derive(Debug)]

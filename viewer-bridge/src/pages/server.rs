@@ -20,8 +20,8 @@ use super::session::{self, Sessions};
 use crate::shutdown::Shutdown;
 use crate::socket::guard::{Guard, TokenDemand, guarded};
 use crate::socket::listen::{HttpListener, client_permits, remedy};
-use crate::socket::lobby::Place;
 use crate::socket::peer::limit;
+use crate::socket::pending_connections::Place;
 
 /// Options of a server.
 #[derive(Debug)]

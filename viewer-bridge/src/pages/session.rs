@@ -7,7 +7,7 @@ use bytes::Bytes;
 use tokio::sync::{Semaphore, SemaphorePermit};
 use tokio::time::timeout;
 
-use super::connection::{Acknowledged, Connection, NextFrame, Wishes};
+use super::connection::{Acknowledged, Connection, NextFrame, Subscription};
 use super::history::PastMessages;
 use super::hub::Hub;
 use super::recordings::Recordings;
@@ -17,8 +17,8 @@ use crate::message::{Command, CommandKind, FromPage, Hello, OutcomeText, Refusal
 use crate::request::{ClientId, RequestKind};
 use crate::shutdown::Shutdown;
 use crate::socket::guard::Guard;
-use crate::socket::lobby::Place;
 use crate::socket::peer::{End, FULL, GOING_AWAY, Peer, TOO_SLOW};
+use crate::socket::pending_connections::Place;
 
 /// A message is malformed.
 const MALFORMED: u16 = 4400;
@@ -44,7 +44,7 @@ pub(super) struct Sessions {
 }
 
 /// The source that a page shows.
-struct Venue {
+struct PageContext {
     hub: Arc<Hub>,
     /// Those that its pages can start.
     recordings: Option<Arc<Recordings>>,
@@ -55,21 +55,21 @@ struct Venue {
 
 impl Sessions {
     /// Returns the source of the bridge, or opens a recording.
-    async fn venue(&self, recording: Option<&str>) -> Result<Venue, End> {
+    async fn context(&self, recording: Option<&str>) -> Result<PageContext, End> {
         let Some(name) = recording else {
             let (hub, recordings) = (Arc::clone(&self.hub), self.recordings.clone());
             let shutdown = self.shutdown.clone();
-            return Ok(Venue { hub, recordings, shutdown, _replay: None });
+            return Ok(PageContext { hub, recordings, shutdown, _replay: None });
         };
         let opened = self.replays.open(name).await;
         let replay = opened.map_err(|reason| End::closed(NO_RECORDING, reason))?;
         let (hub, shutdown) = (Arc::clone(&replay.hub), replay.shutdown.clone());
-        Ok(Venue { hub, recordings: None, shutdown, _replay: Some(replay) })
+        Ok(PageContext { hub, recordings: None, shutdown, _replay: Some(replay) })
     }
 }
 
 /// Serves a page until it leaves or breaks the rules. A page counts against the limit once it has sent
-/// a valid token; until then it only holds its place in the lobby. Only then is its recording opened, if
+/// a valid token; until then it only holds its place among the pending connections. Only then is its recording opened, if
 /// it is the page of one.
 pub(super) async fn serve(
     socket: WebSocket,
@@ -81,8 +81,8 @@ pub(super) async fn serve(
     let end = match place.while_held(greet(&mut peer, sessions)).await {
         Some(Ok(Greeting { hello, _permit })) => {
             drop(place);
-            return match sessions.venue(recording).await {
-                Ok(venue) => serve_page(peer, sessions, &venue, &hello).await,
+            return match sessions.context(recording).await {
+                Ok(context) => serve_page(peer, sessions, &context, &hello).await,
                 Err(end) => peer.close(end).await,
             };
         }
@@ -108,14 +108,14 @@ async fn greet<'a>(peer: &mut Peer, sessions: &'a Sessions) -> Result<Greeting<'
     Ok(Greeting { hello, _permit: permit })
 }
 
-async fn serve_page(mut peer: Peer, sessions: &Sessions, venue: &Venue, hello: &Hello) {
+async fn serve_page(mut peer: Peer, sessions: &Sessions, context: &PageContext, hello: &Hello) {
     if hello.parts {
         peer.send_in_parts();
     }
-    let connection = venue.hub.join(hello.format);
-    let membership = Membership { hub: &venue.hub, client: connection.client };
+    let connection = context.hub.join(hello.format);
+    let membership = Membership { hub: &context.hub, client: connection.client };
     let end = tokio::select! {
-        end = converse(&mut peer, venue, connection) => end,
+        end = converse(&mut peer, context, connection) => end,
         () = sessions.shutdown.begun() => End::closed(GOING_AWAY, "the server shuts down"),
     };
     // The grabs of the page end at once, however slowly it closes.
@@ -162,8 +162,8 @@ fn parse(message: &Message) -> Result<FromPage, End> {
 }
 
 /// Talks with a page that has joined, until the end.
-async fn converse(peer: &mut Peer, venue: &Venue, mut connection: Connection) -> End {
-    let hub = &venue.hub;
+async fn converse(peer: &mut Peer, context: &PageContext, mut connection: Connection) -> End {
+    let hub = &context.hub;
     loop {
         let has_credit = connection.credit.is_left();
         let result = tokio::select! {
@@ -173,14 +173,14 @@ async fn converse(peer: &mut Peer, venue: &Venue, mut connection: Connection) ->
                 None => Err(End::closed(TOO_SLOW, "too many messages were left unread")),
             },
             message = peer.receive() => match message {
-                Ok(message) => accept(&message, peer, venue, &mut connection).await,
+                Ok(message) => accept(&message, peer, context, &mut connection).await,
                 Err(end) => Err(end),
             },
             changed = connection.frames.changed(), if has_credit => match changed {
                 Ok(()) => send_frame(peer, hub, &mut connection).await,
                 Err(_) => Err(End::closed(GOING_AWAY, "the server shuts down")),
             },
-            () = venue.shutdown.begun() => Err(End::closed(GOING_AWAY, "the server shuts down")),
+            () = context.shutdown.begun() => Err(End::closed(GOING_AWAY, "the server shuts down")),
         };
         if let Err(end) = result {
             return end;
@@ -242,20 +242,20 @@ async fn show_past(
 async fn accept(
     message: &Message,
     peer: &mut Peer,
-    venue: &Venue,
+    context: &PageContext,
     connection: &mut Connection,
 ) -> Result<(), End> {
-    let hub = &*venue.hub;
+    let hub = &*context.hub;
     match parse(message)? {
         FromPage::Ack { frame } => {
             if connection.acknowledge(frame) == Acknowledged::CreditRestored {
                 hub.request(connection.client, RequestKind::Credit);
             }
         }
-        FromPage::Forces { is_on } => subscribe(hub, connection, |wishes| wishes.forces = is_on),
-        FromPage::Speeds { is_on } => subscribe(hub, connection, |wishes| wishes.speeds = is_on),
+        FromPage::Forces { is_on } => subscribe(hub, connection, |wanted| wanted.forces = is_on),
+        FromPage::Speeds { is_on } => subscribe(hub, connection, |wanted| wanted.speeds = is_on),
         FromPage::Inspect { particles } => {
-            subscribe(hub, connection, |wishes| wishes.particles = particles);
+            subscribe(hub, connection, |wanted| wanted.particles = particles);
         }
         FromPage::Command(command) => match command.kind {
             CommandKind::Look { step, toward } => {
@@ -263,7 +263,7 @@ async fn accept(
                 return show_past(peer, connection, command.id, sought).await;
             }
             CommandKind::Record {} | CommandKind::StopRecording {} => {
-                control_recording(venue, connection.client, &command);
+                control_recording(context, connection.client, &command);
             }
             _ => submit(hub, connection.client, command),
         },
@@ -273,17 +273,17 @@ async fn accept(
 }
 
 /// Changes what a page receives with each frame.
-fn subscribe(hub: &Hub, connection: &Connection, change: impl FnOnce(&mut Wishes)) {
-    connection.with_wishes(change);
+fn subscribe(hub: &Hub, connection: &Connection, change: impl FnOnce(&mut Subscription)) {
+    connection.change_subscription(change);
     // The page has not received this part of the state on show.
     hub.request(connection.client, RequestKind::State);
 }
 
 /// Starts or stops a recording, and answers at once: the state of the recording follows as messages of
 /// their own.
-fn control_recording(venue: &Venue, client: ClientId, command: &Command) {
+fn control_recording(context: &PageContext, client: ClientId, command: &Command) {
     let (id, kind) = (command.id, command.kind.name());
-    let result = match &venue.recordings {
+    let result = match &context.recordings {
         None => Err(Refusal::OnlyLive),
         Some(recordings) if matches!(command.kind, CommandKind::Record {}) => recordings.start(),
         Some(recordings) => recordings.stop(),
@@ -293,7 +293,7 @@ fn control_recording(venue: &Venue, client: ClientId, command: &Command) {
         Err(reason) => OutcomeText::refused(id, kind, reason),
     };
     if id.is_some() || result.is_err() {
-        venue.hub.send(client, &ToPage::Outcome(answer));
+        context.hub.send(client, &ToPage::Outcome(answer));
     }
 }
 

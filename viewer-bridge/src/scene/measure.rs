@@ -3,7 +3,7 @@
 use sim_contract::{ConstraintKind, ConstraintState, ParticleState, TornConstraint};
 use sim_solver::Energy;
 
-use crate::wire::convert::to_f32;
+use crate::wire::to_f32;
 
 /// Stretch and energy of a state. NaN without any structural constraint.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,4 +1,8 @@
 //! Accepts HTTP connections and hands them to a router, within the limits on time and number.
+//!
+//! Visitors have a share of the file descriptors of the process. A missing descriptor does
+//! harm elsewhere: the link to a node that starts needs about a hundred, and the Foxglove library accepts
+//! no client again after one failure.
 
 use std::io;
 use std::net::SocketAddr;
@@ -11,16 +15,17 @@ use hyper::server::conn::http1;
 use hyper::service::{Service, service_fn};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
+use rustix::io::Errno;
+use rustix::process::{Resource, getrlimit};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::Semaphore;
 use tokio::time::{sleep, timeout};
 
-use super::descriptors;
-use super::lobby::{Lobby, Place};
-use super::throttle::{BYTES, Throttled};
+use super::pending_connections::{PendingConnections, Place};
+use super::rate_limit::{BYTES, Throttled};
 use crate::limits::{
-    ACCEPT_PAUSE, CLIENTS_MAX, CONNECTION_TIMEOUT, HEAD_SIZE_BYTES_MAX, HELLO_TIMEOUT,
-    SHUTDOWN_TIMEOUT,
+    ACCEPT_PAUSE, CLIENTS_MAX, CONNECTION_TIMEOUT, DESCRIPTORS_PER_VISITOR, DESCRIPTORS_RESERVED,
+    HEAD_SIZE_BYTES_MAX, HELLO_TIMEOUT, SHUTDOWN_TIMEOUT, VISITORS_MAX, VISITORS_MIN,
 };
 use crate::shutdown::Shutdown;
 
@@ -74,7 +79,7 @@ impl HttpListener {
 
 /// Accepts connections until the shutdown begins.
 async fn accept(listener: &TcpListener, router: &Router, shutdown: &Shutdown) {
-    let lobby = Lobby::new(descriptors::visitor_count_max());
+    let pending = PendingConnections::new(visitor_count_max());
     loop {
         let accepted = tokio::select! {
             accepted = listener.accept() => accepted,
@@ -84,19 +89,19 @@ async fn accept(listener: &TcpListener, router: &Router, shutdown: &Shutdown) {
             Ok(accepted) => accepted,
             Err(error) => {
                 // Otherwise the connection broke before it was accepted.
-                if descriptors::are_exhausted(&error) {
-                    lobby.make_room();
+                if are_exhausted(&error) {
+                    pending.make_room();
                 }
                 sleep(ACCEPT_PAUSE).await;
                 continue;
             }
         };
-        let place = lobby.admit(address.ip()).await;
+        let place = pending.admit(address.ip()).await;
         tokio::spawn(serve_connection(stream, router.clone(), place));
     }
 }
 
-/// Serves the requests of one connection. Each of them carries the place in the lobby, which a request
+/// Serves the requests of one connection. Each of them carries its place among the pending connections, which a request
 /// for a socket keeps until the socket belongs to a client.
 async fn serve_connection(stream: TcpStream, router: Router, place: Place) {
     // Without the option, small messages are only delayed.
@@ -117,4 +122,54 @@ async fn serve_connection(stream: TcpStream, router: Router, place: Place) {
         .with_upgrades();
     // A broken connection needs no report. A WebSocket is served by its own task after the upgrade.
     let _ended = place.while_held(timeout(CONNECTION_TIMEOUT, connection)).await;
+}
+
+/// Number of open files with which connections never fail for lack of a descriptor.
+const OPEN_FILES_MIN: usize = DESCRIPTORS_RESERVED + VISITORS_MIN * DESCRIPTORS_PER_VISITOR;
+
+/// Returns the number of visitors that each server can have under the limit of the system.
+pub(super) fn visitor_count_max() -> usize {
+    open_file_limit().map_or(VISITORS_MAX, visitor_count_for)
+}
+
+/// Returns a warning for the user if the system allows too few open files for all clients.
+pub fn open_files_warning() -> Option<String> {
+    let limit = open_file_limit().filter(|limit| *limit < OPEN_FILES_MIN)?;
+    Some(format!(
+        "warning: the system allows only {limit} open files, too few for all clients; raise the limit \
+         with `ulimit -n {OPEN_FILES_MIN}`"
+    ))
+}
+
+fn open_file_limit() -> Option<usize> {
+    getrlimit(Resource::Nofile).current.and_then(|limit| usize::try_from(limit).ok())
+}
+
+fn visitor_count_for(limit: usize) -> usize {
+    let available = limit.saturating_sub(DESCRIPTORS_RESERVED);
+    (available / DESCRIPTORS_PER_VISITOR).clamp(VISITORS_MIN, VISITORS_MAX)
+}
+
+/// Returns whether the process or the system has no descriptor or memory left for a socket.
+pub(super) fn are_exhausted(error: &io::Error) -> bool {
+    matches!(
+        Errno::from_io_error(error),
+        Some(Errno::MFILE | Errno::NFILE | Errno::NOBUFS | Errno::NOMEM)
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn visitors_and_everything_else_stay_within_the_limit() {
+        for limit in [512, 700, 1024, 1 << 20] {
+            let count = visitor_count_for(limit);
+            assert!(count * DESCRIPTORS_PER_VISITOR + DESCRIPTORS_RESERVED <= limit, "{limit}");
+        }
+        assert_eq!(visitor_count_for(1024), VISITORS_MAX);
+        assert_eq!(visitor_count_for(OPEN_FILES_MIN), VISITORS_MIN);
+        assert_eq!(visitor_count_for(0), VISITORS_MIN);
+    }
 }

@@ -5,13 +5,11 @@ mod carrier;
 mod dispatch;
 mod link;
 mod newest_state;
-mod node_text;
 mod outcomes;
-mod statistics;
+mod status;
 #[cfg(test)]
 mod tests;
 mod undo;
-mod updates;
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -20,7 +18,7 @@ use sim_contract::clock::monotonic_ns;
 use sim_contract::console::note;
 use sim_contract::{AttachError, Endpoint};
 
-use super::feed::Source;
+use super::Source;
 use crate::message::{Mode, Node, NodeState, OutcomeText, ParametersText, Refusal};
 use crate::request::{RequestKind, Requests};
 use crate::scene::catalog::{Catalog, SceneEntry};

@@ -22,7 +22,7 @@ use anyhow::Context;
 use recording::ReadError;
 use sim_contract::Stop;
 
-use super::feed::Source;
+use super::Source;
 use crate::message::Mode;
 use crate::request::Requests;
 use crate::sink::Sinks;

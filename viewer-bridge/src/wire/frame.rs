@@ -3,8 +3,8 @@
 use bytes::Bytes;
 use sim_contract::ParticleState;
 
-use super::header::{Kind, Stamp};
 use super::writer::Writer;
+use super::writer::{Kind, Stamp};
 
 /// Encoding of positions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

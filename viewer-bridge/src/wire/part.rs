@@ -7,10 +7,10 @@ use bytes::Bytes;
 use flate2::Compression;
 use flate2::write::DeflateEncoder;
 
-use super::header::{Kind, Stamp};
 use super::writer::Writer;
+use super::writer::count_u32;
+use super::writer::{Kind, Stamp};
 use crate::limits::PART_SIZE_BYTES;
-use crate::wire::convert::count_u32;
 
 /// A piece of a binary message.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]

@@ -6,8 +6,8 @@ use sim_contract::{ConstraintState, ParticleState, Triangle};
 use sim_solver::scene::{ColliderMesh, ColliderMeshes};
 
 use super::frame::Bounds;
-use super::header::{Kind, Stamp};
 use super::writer::Writer;
+use super::writer::{Kind, Stamp};
 
 /// The bits of a scene's flags.
 pub mod scene_flag {

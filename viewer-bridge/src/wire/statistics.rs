@@ -2,8 +2,8 @@
 
 use bytes::Bytes;
 
-use super::header::{Kind, Stamp};
 use super::writer::Writer;
+use super::writer::{Kind, Stamp};
 
 /// The bits of the statistics' flags.
 pub mod statistics_flag {

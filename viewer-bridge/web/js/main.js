@@ -32,7 +32,7 @@ import { ReplayTrack } from "./timeline/replay-track.js";
 import { Undo } from "./ui/undo.js";
 import { createViewer } from "./viewer.js";
 import { Views } from "./ui/views.js";
-import { Wishes } from "./state/wishes.js";
+import { Subscription } from "./state/subscription.js";
 
 /** Key of the token in sessionStorage, so that it survives a reload. */
 const TOKEN_KEY = "catenary-token";
@@ -131,7 +131,7 @@ function start(renderer) {
   controls.onPicture = () => picture.save();
   const video = new Video(renderer, composition, banner);
   new RecordingControl(app, token);
-  const wishes = new Wishes(simulation, commands, {
+  const subscription = new Subscription(simulation, commands, {
     forces: () => renderer.toggles.forces || inspector.wantsForces(),
     speeds: () => renderer.toggles.heat && renderer.coloring.quantity === "speed",
     inspected: () => app.selection.particles,
@@ -154,7 +154,7 @@ function start(renderer) {
     hud.tick(nowMs);
     colorLegend.tick(nowMs);
     forceLegend.tick();
-    wishes.tick();
+    subscription.tick();
     renderer.resize();
     video.request(nowMs);
     const between = performance.now();

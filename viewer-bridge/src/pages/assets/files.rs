@@ -77,7 +77,7 @@ pub(super) const FILES: &[(&str, &[u8])] = files![
     "js/state/splits.js",
     "js/state/topology.js",
     "js/state/weave.js",
-    "js/state/wishes.js",
+    "js/state/subscription.js",
     "js/timeline/live-track.js",
     "js/timeline/marks.js",
     "js/timeline/replay-track.js",

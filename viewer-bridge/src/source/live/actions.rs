@@ -4,7 +4,7 @@ use sim_contract::{Action, Parameter, ParticleState};
 
 use crate::message::{Brush, CommandKind, Refusal};
 use crate::scene::catalog::Catalog;
-use crate::wire::convert::to_f32;
+use crate::wire::to_f32;
 
 /// The state to which a command refers.
 #[derive(Debug, Clone, Copy)]

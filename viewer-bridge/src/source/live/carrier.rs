@@ -15,7 +15,7 @@ use super::newest_state::LoadedState;
 use crate::limits::CARRIED_MAX;
 use crate::message::{Object, Refusal};
 use crate::request::ClientId;
-use crate::wire::convert::to_f32;
+use crate::wire::to_f32;
 
 /// Time in which a thrown object loses all but 1/e of its velocity, in s.
 const GLIDE_S: f64 = 0.3;

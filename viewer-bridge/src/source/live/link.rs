@@ -13,14 +13,14 @@ use sim_contract::{
 use super::actions::CommandContext;
 use super::carrier::{Carrier, Place};
 use super::dispatch::Dispatch;
+use super::newest_state::Updates;
 use super::newest_state::{LoadedState, NewestState};
-use super::node_text::node_text;
 use super::outcomes::{HeldByClients, handle_outcomes};
-use super::statistics::statistics;
+use super::status::node_text;
+use super::status::statistics;
 use super::undo::kept_state::Keyframes;
 use super::undo::stack::Change;
 use super::undo::{Undo, UndoRequest};
-use super::updates::Updates;
 use crate::limits::{FRAMES_PER_SECOND_MAX, RELEASE_TIMEOUT};
 use crate::message::{Command, CommandKind, Level, Node, OutcomeText, ParametersText, Refusal};
 use crate::request::{ClientId, Request, RequestKind, Requests};

@@ -1,7 +1,9 @@
-//! The newest state of a node, and the load to which it belongs.
+//! The newest state of a node with its load, and the messages that take effect before their state: a paused node answers
+//! commands as well.
 
 use sim_contract::{
-    Change, Forces, LoadHeader, LoadedScene, ParticleState, SnapshotHeader, State as NodeState,
+    Change, Forces, LoadHeader, LoadedScene, NodeStatus, Outcome, ParameterValues, ParticleState,
+    SnapshotHeader, State as NodeState, Update as NodeUpdate,
 };
 
 use crate::scene::load::{Load, LoadError};
@@ -97,4 +99,53 @@ fn read_load(loaded: &LoadedScene) -> Result<Load, LoadError> {
         triangles: loaded.triangles.clone(),
     };
     load.checked(loaded.header.particle_count)
+}
+
+/// Messages since the last read.
+#[derive(Debug, Default)]
+pub(super) struct Updates {
+    /// The run of the link; `None` before its first message.
+    known_run: Option<u64>,
+    /// Outcomes of every run, in order: a command can reach the run after the one it was sent to.
+    pub(super) outcomes: Vec<Outcome>,
+    /// The newest parameters.
+    pub(super) parameters: Option<ParameterValues>,
+    /// The newest status of the known run.
+    pub(super) status: Option<NodeStatus>,
+    /// Steps and bytes of the keyframes of the known run.
+    pub(super) keyframes: Vec<(u64, Vec<u8>)>,
+    /// Run of the newest load or status.
+    pub(super) run_id: Option<u64>,
+}
+
+impl Updates {
+    pub(super) fn for_run(known_run: Option<u64>) -> Self {
+        Self { known_run, ..Self::default() }
+    }
+
+    pub(super) fn add(&mut self, update: &NodeUpdate<'_>) {
+        match *update {
+            NodeUpdate::Topology(header, _) => self.run_id = Some(header.run_id),
+            NodeUpdate::Parameters(_, values) => self.parameters = Some(values.clone()),
+            NodeUpdate::Outcome(outcome) => self.outcomes.push(*outcome),
+            NodeUpdate::Status(status) => {
+                self.run_id = Some(status.run_id);
+                if self.known_run.is_none_or(|known| known == status.run_id) {
+                    self.status = Some(*status);
+                }
+            }
+            NodeUpdate::Keyframe(header, bytes) => {
+                if self.known_run.is_none_or(|known| known == header.run_id) {
+                    self.keyframes.push((header.step, bytes.to_vec()));
+                }
+            }
+            // The tap returns these with their state.
+            NodeUpdate::Scene(..)
+            | NodeUpdate::Bends(..)
+            | NodeUpdate::Surface(..)
+            | NodeUpdate::Colliders(..)
+            | NodeUpdate::Tears(..)
+            | NodeUpdate::Forces(..) => {}
+        }
+    }
 }

@@ -123,7 +123,7 @@ impl Fixture {
         self.publish(step, 0, 2);
     }
 
-    /// Follows the wishes of the pages.
+    /// Follows the subscriptions of the pages.
     fn exchange(&mut self) {
         self.link.exchange(&mut self.shown, &self.sinks, &self.requests).unwrap();
         self.owner.refresh();
@@ -386,7 +386,7 @@ fn forces_are_read_while_a_page_wants_them_and_sent_to_that_page_with_their_fram
     let mut other = fixture.hub.join(Choice::F32);
     fixture.exchange();
     assert_eq!(fixture.owner.forces_reader_count(), 0);
-    fixture.page.with_wishes(|wishes| wishes.forces = true);
+    fixture.page.change_subscription(|subscription| subscription.forces = true);
     fixture.exchange();
     assert_eq!(fixture.owner.forces_reader_count(), 1);
     let row = |step: f32| ForceRow { kind: 2, impulse: [0.0, step, 0.0], ..ForceRow::default() };
@@ -407,8 +407,8 @@ fn forces_are_read_while_a_page_wants_them_and_sent_to_that_page_with_their_fram
     fixture.publish(3, 0, 2);
     fixture.read();
     assert!(matches!(Fixture::received(&mut fixture.page)[..], [Wire::Frame(_)]));
-    other.with_wishes(|wishes| wishes.forces = true);
-    fixture.page.with_wishes(|wishes| wishes.forces = false);
+    other.change_subscription(|subscription| subscription.forces = true);
+    fixture.page.change_subscription(|subscription| subscription.forces = false);
     fixture.exchange();
     assert_eq!(fixture.owner.forces_reader_count(), 1, "another page wants them");
     fixture.hub.leave(other.client);
@@ -420,8 +420,8 @@ fn forces_are_read_while_a_page_wants_them_and_sent_to_that_page_with_their_fram
 fn a_page_receives_the_speeds_and_the_exact_particles_that_it_asks_for_with_their_frame() {
     let mut fixture = Fixture::start();
     let mut other = fixture.hub.join(Choice::F32);
-    fixture.page.with_wishes(|wishes| wishes.speeds = true);
-    other.with_wishes(|wishes| wishes.particles = vec![1, 9]);
+    fixture.page.change_subscription(|subscription| subscription.speeds = true);
+    other.change_subscription(|subscription| subscription.particles = vec![1, 9]);
     fixture.publish(1, 0, 2);
     fixture.read();
     let [Wire::Speeds(speeds), Wire::Frame(frame)] = &Fixture::received(&mut fixture.page)[..]
@@ -438,8 +438,8 @@ fn a_page_receives_the_speeds_and_the_exact_particles_that_it_asks_for_with_thei
     assert_eq!(inspected.stamp, frame.head.stamp);
     assert_eq!(inspected.particles[0].position, frame.positions[1]);
 
-    fixture.page.with_wishes(|wishes| wishes.speeds = false);
-    other.with_wishes(|wishes| wishes.particles.clear());
+    fixture.page.change_subscription(|subscription| subscription.speeds = false);
+    other.change_subscription(|subscription| subscription.particles.clear());
     fixture.publish(2, 0, 2);
     fixture.read();
     for page in [&mut fixture.page, &mut other] {

@@ -7,7 +7,7 @@ import { identity } from "../../js/geometry/math.js";
 import { holderOf, inspectConstraint, inspectParticle, distanceOf } from "../../js/state/inspection.js";
 import { SELECTED_MAX, Selection, parseItems } from "../../js/state/selection.js";
 import { Simulation } from "../../js/state/simulation.js";
-import { Wishes } from "../../js/state/wishes.js";
+import { Subscription } from "../../js/state/subscription.js";
 
 /** Four particles in a row, 1 apart, joined by a compliant, a rigid and a slack constraint. */
 const scene = (epoch, change = {}) => ({
@@ -30,16 +30,16 @@ function started() {
 test("a selection has the exact states of its particles and of the ends of its constraints", () => {
   const { simulation, selection } = started();
   const sent = [];
-  const wishes = new Wishes(simulation, { send: (message) => sent.push(message) > 0 }, { forces: () => false, speeds: () => false, inspected: () => selection.particles });
-  wishes.tick();
+  const subscription = new Subscription(simulation, { send: (message) => sent.push(message) > 0 }, { forces: () => false, speeds: () => false, inspected: () => selection.particles });
+  subscription.tick();
   assert.deepEqual(sent, [], "there is no connection");
   simulation.setConnected(true);
-  wishes.tick();
+  subscription.tick();
   assert.deepEqual(sent, [], "an empty selection asks for nothing");
   selection.toggle(particle(3));
   selection.toggle(constraint(0));
-  wishes.tick();
-  wishes.tick();
+  subscription.tick();
+  subscription.tick();
   assert.deepEqual(sent, [{ type: "inspect", particles: [0, 1, 3] }]);
   simulation.receive({ kind: "inspected", epoch: 1, step: 2, rows: [{ particle: 3, position: [3, 0.5, 0], velocity: [0, 3, 4], inverseMass: 2 }] });
   simulation.receive(frame(1, 2));
@@ -49,10 +49,10 @@ test("a selection has the exact states of its particles and of the ends of its c
   assert.ok(Number.isNaN(inspectParticle(simulation, 3).speed), "the frame came without states");
   simulation.setConnected(false);
   simulation.setConnected(true);
-  wishes.tick();
+  subscription.tick();
   assert.equal(sent.length, 2, "a new connection is asked again");
   selection.clear();
-  wishes.tick();
+  subscription.tick();
   assert.deepEqual(sent.at(-1), { type: "inspect", particles: [] });
 });
 

@@ -1,7 +1,7 @@
-//! The lobby: connections that are not clients yet.
+//! Pending connections: those that are not clients yet.
 //!
 //! Every connection begins here. It leaves when it becomes a client: a page with a valid `hello`, a
-//! Foxglove client with a valid message. A full lobby still admits a newcomer, because the connection
+//! Foxglove client with a valid message. A full list still admits a newcomer, because the connection
 //! that has been inactive for the longest time makes room. Connections that only wait therefore keep
 //! nobody out, however many there are, and clients are never in danger.
 
@@ -16,7 +16,7 @@ use crate::limits::EVICTION_PERIOD;
 
 /// The connections of one server that are not clients yet.
 #[derive(Debug)]
-pub(crate) struct Lobby {
+pub(crate) struct PendingConnections {
     places: Arc<Semaphore>,
     visitors: Mutex<Visitors>,
 }
@@ -37,10 +37,10 @@ struct Visitor {
     _eviction: watch::Sender<()>,
 }
 
-/// A place in the lobby. Dropping it makes room for another connection.
+/// A place among the pending connections. Dropping it makes room for another connection.
 #[derive(Debug)]
 pub(crate) struct Place {
-    lobby: Arc<Lobby>,
+    pending: Arc<PendingConnections>,
     number: u64,
     /// Closed when the connection must make room.
     eviction: watch::Receiver<()>,
@@ -67,8 +67,8 @@ impl Visitors {
     }
 }
 
-impl Lobby {
-    /// Creates an empty lobby.
+impl PendingConnections {
+    /// Creates an empty list.
     pub(super) fn new(place_count: usize) -> Arc<Self> {
         let places = Arc::new(Semaphore::new(place_count));
         Arc::new(Self { places, visitors: Mutex::default() })
@@ -101,14 +101,14 @@ impl Lobby {
         let activity = visitors.next_activity();
         let visitor = Visitor { network: network(address), activity, _eviction: sender };
         visitors.by_number.insert(number, visitor);
-        Place { lobby: Arc::clone(self), number, eviction, _permit: permit }
+        Place { pending: Arc::clone(self), number, eviction, _permit: permit }
     }
 }
 
 impl Place {
     /// Notes that the connection does something.
     pub(super) fn note_activity(&self) {
-        let mut visitors = self.lobby.visitors();
+        let mut visitors = self.pending.visitors();
         let activity = visitors.next_activity();
         if let Some(visitor) = visitors.by_number.get_mut(&self.number) {
             visitor.activity = activity;
@@ -133,7 +133,7 @@ impl Place {
 
 impl Drop for Place {
     fn drop(&mut self) {
-        self.lobby.visitors().by_number.remove(&self.number);
+        self.pending.visitors().by_number.remove(&self.number);
     }
 }
 
@@ -156,8 +156,8 @@ mod tests {
     use super::*;
 
     /// Admits a connection that needs no other to end first.
-    fn admit(lobby: &Arc<Lobby>, address: &str) -> Place {
-        lobby.admit(address.parse().unwrap()).now_or_never().unwrap()
+    fn admit(pending: &Arc<PendingConnections>, address: &str) -> Place {
+        pending.admit(address.parse().unwrap()).now_or_never().unwrap()
     }
 
     fn is_evicted(place: &Place) -> bool {
@@ -166,10 +166,10 @@ mod tests {
 
     #[tokio::test]
     async fn the_longest_inactive_connection_makes_room_for_a_newcomer() {
-        let lobby = Lobby::new(3);
-        let places = [(); 3].map(|()| admit(&lobby, "127.0.0.1"));
+        let pending = PendingConnections::new(3);
+        let places = [(); 3].map(|()| admit(&pending, "127.0.0.1"));
         places[0].note_activity();
-        let newcomer = lobby.admit("127.0.0.1".parse().unwrap());
+        let newcomer = pending.admit("127.0.0.1".parse().unwrap());
         tokio::pin!(newcomer);
         assert!((&mut newcomer).now_or_never().is_none());
         assert_eq!(places.each_ref().map(is_evicted), [false, true, false]);
@@ -178,17 +178,17 @@ mod tests {
         drop(second);
         let newcomer = newcomer.await;
         assert!(![&first, &third, &newcomer].into_iter().any(is_evicted));
-        assert!(lobby.admit("127.0.0.1".parse().unwrap()).now_or_never().is_none());
+        assert!(pending.admit("127.0.0.1".parse().unwrap()).now_or_never().is_none());
         assert!(is_evicted(&third) && !is_evicted(&first));
     }
 
     #[tokio::test]
     async fn the_network_with_the_most_connections_makes_room() {
-        let lobby = Lobby::new(4);
-        let lone = admit(&lobby, "10.0.0.1");
+        let pending = PendingConnections::new(4);
+        let lone = admit(&pending, "10.0.0.1");
         // One machine has a whole /64 of addresses.
-        let crowd = ["2001:db8::1", "2001:db8::2", "2001:db8::3"].map(|one| admit(&lobby, one));
-        assert!(lobby.admit("10.0.0.2".parse().unwrap()).now_or_never().is_none());
+        let crowd = ["2001:db8::1", "2001:db8::2", "2001:db8::3"].map(|one| admit(&pending, one));
+        assert!(pending.admit("10.0.0.2".parse().unwrap()).now_or_never().is_none());
         assert!(!is_evicted(&lone));
         assert_eq!(crowd.each_ref().map(is_evicted), [true, false, false]);
         assert_eq!(
@@ -200,13 +200,13 @@ mod tests {
     #[tokio::test]
     async fn evictions_leave_every_connection_time_to_become_a_client() {
         const COUNT: u32 = 10;
-        let lobby = Lobby::new(1);
-        let mut place = admit(&lobby, "127.0.0.1");
+        let pending = PendingConnections::new(1);
+        let mut place = admit(&pending, "127.0.0.1");
         let start_ns = monotonic_ns();
         for _ in 0..COUNT {
             // The evicted connection ends at once.
             tokio::spawn(async move { place.evicted().await });
-            place = lobby.admit("127.0.0.1".parse().unwrap()).await;
+            place = pending.admit("127.0.0.1".parse().unwrap()).await;
         }
         let elapsed = Duration::from_nanos(monotonic_ns() - start_ns);
         assert!(elapsed >= COUNT * EVICTION_PERIOD, "{elapsed:?}");
@@ -214,12 +214,12 @@ mod tests {
 
     #[tokio::test]
     async fn a_connection_that_leaves_makes_room_without_an_eviction() {
-        let lobby = Lobby::new(1);
-        drop(admit(&lobby, "127.0.0.1"));
-        let place = admit(&lobby, "127.0.0.1");
+        let pending = PendingConnections::new(1);
+        drop(admit(&pending, "127.0.0.1"));
+        let place = admit(&pending, "127.0.0.1");
         assert!(!is_evicted(&place));
         assert_eq!(place.while_held(async { 7 }).now_or_never(), Some(Some(7)));
-        lobby.make_room();
+        pending.make_room();
         assert_eq!(place.while_held(std::future::pending::<()>()).now_or_never(), Some(None));
     }
 }

@@ -3,7 +3,7 @@
 
 /** @typedef {{ forces(): boolean, speeds(): boolean, inspected(): number[] }} Wanted */
 
-export class Wishes {
+export class Subscription {
   /** @param {import("./simulation.js").Simulation} simulation @param {import("../net/commands.js").Commands} commands @param {Wanted} wanted */
   constructor(simulation, commands, wanted) {
     this.simulation = simulation;
@@ -16,7 +16,7 @@ export class Wishes {
     simulation.on("connection", () => this.forget());
   }
 
-  /** A new connection has no wishes yet. */
+  /** A new connection has no subscription yet. */
   forget() {
     this.forces = false;
     this.speeds = false;

@@ -1,12 +1,13 @@
-//! Statistics of a live node.
+//! State and statistics of a live node, for clients.
 
 use sim_contract::{NodeStatus, StatusFlags};
 
 use super::newest_state::LoadedState;
+use crate::message::{Node, NodeState};
 use crate::scene::measure::{measure, torn_flags};
 use crate::source::shown_state::ShownState;
-use crate::wire::convert::{microseconds, to_f32};
 use crate::wire::{Percentiles, Stamp, Statistics, statistics_flag};
+use crate::wire::{microseconds, to_f32};
 
 /// Collects the statistics of the node and measures the state.
 pub(super) fn statistics(
@@ -43,5 +44,28 @@ pub(super) fn statistics(
         flags: flag(StatusFlags::PAUSED, statistics_flag::PAUSED)
             | flag(StatusFlags::REPLAY, statistics_flag::REPLAY),
         ..Statistics::default()
+    }
+}
+
+/// Describes a node that runs. `method` is that of the load on show.
+pub(super) fn node_text(status: Option<&NodeStatus>, method: Option<&'static str>) -> Node {
+    let Some(status) = status else {
+        return Node {
+            state: NodeState::Alive,
+            text: "a node is running, but has not published its status yet".to_owned(),
+            ..Node::default()
+        };
+    };
+    Node {
+        state: NodeState::Alive,
+        text: String::new(),
+        run_id: Some(format!("{:016x}", status.run_id)),
+        scene: Some(status.scene_name()),
+        method,
+        rate_hz: status.rate_hz,
+        is_paused: status.is_paused(),
+        is_replay: status.is_replay(),
+        time_scale: status.time_scale,
+        process_id: Some(status.process_id),
     }
 }

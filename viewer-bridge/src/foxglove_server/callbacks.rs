@@ -1,14 +1,116 @@
-//! The services: pause, resume, step and reset.
+//! Calls of the library for its clients: subscriptions, published commands, playback control, parameters, and the
+//! services pause, resume, step and reset.
 
 use std::sync::Arc;
 
 use foxglove::Schema;
 use foxglove::websocket::service::{Handler, Request, Responder, Service, ServiceSchema};
+use foxglove::websocket::{
+    AnyClient, ChannelView, Client, ClientChannel, GetParametersResponder, Parameter,
+    ParameterHandler, PlaybackControlRequest, PlaybackState, ServerListener,
+    SetParametersResponder,
+};
 use serde::Deserialize;
 use sim_contract::Action;
 
-use super::request_bridge::RequestBridge;
+use super::publisher::Publisher;
+use super::request_bridge::{ANY_CLIENT, RequestBridge};
+use super::server::FoxglovePermission;
 use crate::limits::STEPS_AT_ONCE_MAX;
+use crate::request::{RequestKind, RequestSender};
+
+/// Topic of the actions that clients publish, one JSON object per message.
+const TOPIC: &str = "/commands";
+
+/// Handles the events of the clients. The library calls it from their tasks; it must not block.
+pub(super) struct ClientEvents {
+    pub(super) requests: RequestSender,
+    pub(super) publisher: Arc<Publisher>,
+    pub(super) bridge: Arc<RequestBridge>,
+}
+
+impl ServerListener for ClientEvents {
+    /// Requests a state, which the client needs even if nothing moves.
+    fn on_subscribe(&self, client: Client, channel: ChannelView<'_>) {
+        self.publisher.add_subscription(channel.topic(), client.sink_id());
+        // Only commands are refused.
+        let _sent = self.requests.send(ANY_CLIENT, RequestKind::State);
+    }
+
+    /// A foreign topic is an error only when something is published on it: viewers advertise topics of their own,
+    /// such as the goals of a 3D panel.
+    fn on_message_data(&self, client: Client, channel: &ClientChannel, payload: &[u8]) {
+        if channel.topic == TOPIC {
+            self.bridge.accept_published(client, payload);
+        } else {
+            let text = format!("this server only accepts {TOPIC}, not {}", channel.topic);
+            self.bridge.complain(&client, text);
+        }
+    }
+
+    fn on_playback_control_request(
+        &self,
+        request: PlaybackControlRequest,
+    ) -> Option<PlaybackState> {
+        self.bridge.control_playback(&request)
+    }
+
+    fn on_client_unadvertise(&self, client: Client, channel: &ClientChannel) {
+        if channel.topic == TOPIC {
+            self.bridge.remove_publisher(client.id());
+        }
+    }
+}
+
+/// Parameters in one request.
+const PARAMETERS_PER_REQUEST_MAX: usize = 64;
+
+/// Handles the clients' requests to get and set parameters.
+#[derive(Debug)]
+pub(super) struct ParameterRequests {
+    bridge: Arc<RequestBridge>,
+    permission: FoxglovePermission,
+}
+
+impl ParameterRequests {
+    pub(super) fn new(bridge: Arc<RequestBridge>, permission: FoxglovePermission) -> Self {
+        Self { bridge, permission }
+    }
+}
+
+impl ParameterHandler for ParameterRequests {
+    fn get(
+        &self,
+        _client: AnyClient,
+        names: Vec<String>,
+        _request_id: Option<String>,
+        responder: GetParametersResponder,
+    ) {
+        responder.respond(self.bridge.present_parameters(&names));
+    }
+
+    fn set(
+        &self,
+        client: AnyClient,
+        parameters: Vec<Parameter>,
+        _request_id: Option<String>,
+        responder: SetParametersResponder,
+    ) {
+        if parameters.is_empty() || parameters.len() > PARAMETERS_PER_REQUEST_MAX {
+            client.send_error(format!("set 1 to {PARAMETERS_PER_REQUEST_MAX} parameters at once"));
+            return responder.respond(Vec::new());
+        }
+        match self.permission {
+            FoxglovePermission::Commands => self.bridge.set_all(client, parameters, responder),
+            FoxglovePermission::ReadOnly => {
+                let text = "this server is read-only; start it with --allow-commands";
+                client.send_error(text.to_owned());
+                let names: Vec<_> = parameters.into_iter().map(|one| one.name).collect();
+                responder.respond(self.bridge.present_parameters(&names));
+            }
+        }
+    }
+}
 
 /// Names of the services: those of the commands.
 const NAMES: [&str; 4] = ["pause", "resume", "step", "reset"];
