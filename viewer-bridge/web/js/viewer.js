@@ -4,7 +4,7 @@ import { inspectItem } from "./state/inspection.js";
 
 /**
  * @typedef {{
- *   app: import("./tools/tool.js").App, colorLegend: import("./legend/color-legend.js").ColorLegend, charts: import("./panel/charts.js").Charts, connector: import("./net/socket.js").Connector,
+ *   app: import("./tools/tool.js").App, colorLegend: import("./legend/legend.js").ColorLegend, charts: import("./panel/charts.js").Charts, connector: import("./net/socket.js").Connector,
  *   banner: import("./ui/banner.js").Banner, input: import("./tools/input.js").Input, faults: string[],
  *   scriptMs: () => number,
  * }} Parts

@@ -2,7 +2,7 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { exampleOf, fieldsOf } from "../js/panel/command-fields.js";
+import { exampleOf, fieldsOf } from "../js/panel/command-form.js";
 import { ACTIONS } from "../js/panel/tables.js";
 
 test("the example of each field is accepted, and optional fields can be absent", () => {

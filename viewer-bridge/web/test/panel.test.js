@@ -5,7 +5,7 @@ import { test } from "node:test";
 import { SLIDER_STEPS, editable, hasBends, partsOf, positionOf, rangeOf, restoring, rowsOf, typedValue, unitOf, valueAt, withSurfaces } from "../js/panel/parameters.js";
 import { ROWS } from "../js/panel/tables.js";
 import { valueOf } from "../js/net/messages.js";
-import { niceCeiling } from "../js/geometry/round.js";
+import { niceCeiling } from "../js/geometry/math.js";
 import { readable } from "../js/ui/format.js";
 
 test("a scale ends at 1, 2 or 5 times a power of ten", () => {

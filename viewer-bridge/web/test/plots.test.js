@@ -2,10 +2,8 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { heights } from "../js/panel/charts.js";
-import { csvOf } from "../js/panel/csv.js";
-import { drawLine } from "../js/panel/plot.js";
-import { Series } from "../js/panel/series.js";
+import { heights, csvOf } from "../js/panel/charts.js";
+import { drawLine, Series } from "../js/panel/plot.js";
 
 function series(capacity, ...samples) {
   const one = new Series(capacity);

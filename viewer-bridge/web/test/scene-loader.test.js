@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { Commands } from "../js/net/commands.js";
 import { Emitter } from "../js/state/emitter.js";
-import { SceneLoader } from "../js/ui/scene-loader.js";
+import { SceneLoader } from "../js/ui/scene-menu.js";
 
 /** A loader with the list of the loads that it sends, and a function that answers the oldest one. */
 function open() {

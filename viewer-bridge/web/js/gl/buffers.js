@@ -7,9 +7,8 @@ import { layFlat } from "../state/weave.js";
 import { ArrayTexture, UNITS, layouts } from "./context.js";
 import { Cloth } from "./particles/cloth.js";
 import { Planks } from "./particles/planks.js";
-import { GhostSticks } from "./particles/ghost-sticks.js";
+import { GhostSticks, Sticks } from "./particles/sticks.js";
 import { POINT, Points } from "./particles/points.js";
-import { Sticks } from "./particles/sticks.js";
 import { PIN } from "../net/wire.js";
 
 /** @typedef {import("../net/wire.js").Frame} Frame */

@@ -2,9 +2,9 @@
 // only if something has.
 
 import { dot, multiply, shadowOnto } from "../geometry/math.js";
+import { POINTS, STICKS, stylesOf } from "./styles.js";
 import { paletteOf } from "./theme.js";
 import { PAINT } from "./shaders.js";
-import { POINTS, STICKS, stylesOf } from "./styles.js";
 import { isSoftware, openContext, rendererName } from "./context.js";
 import { Arrows } from "./arrows.js";
 import { Drawables, SceneBuffers } from "./buffers.js";

@@ -1,14 +1,10 @@
 // The plots: those of the user first, those of the solver folded away. All share one axis of simulation time,
 // a cursor, and a button that holds them.
 
-import { find, make } from "../ui/dom.js";
-import { readable } from "../ui/format.js";
-import { sceneUnits } from "../ui/units.js";
-import { save } from "../ui/save.js";
-import { csvOf } from "./csv.js";
-import { Plot } from "./plot.js";
+import { find, make, save } from "../ui/dom.js";
+import { readable, sceneUnits } from "../ui/format.js";
+import { Plot, Series } from "./plot.js";
 import { SelectionPlots } from "./selection-plots.js";
-import { Series } from "./series.js";
 
 /** Capacity of the series: two minutes of frames, and of STATS messages (four per second). */
 const FRAME_SAMPLES = 7200;
@@ -264,3 +260,25 @@ export function heights({ bounds: { min, max }, particleCount }, up) {
   const b = max[axis] * up[axis];
   return { low: Math.min(a, b), high: Math.max(a, b) };
 }
+
+/** @typedef {{ name: string, series: import("./plot.js").Series }} Column */
+
+/** @param {Column[]} columns @param {number} rateHz steps per second */
+export function csvOf(columns, rateHz) {
+  const lines = [["time_s", "step", ...columns.map(({ name }) => name)].map(quoted).join(",")];
+  const next = columns.map(() => 0);
+  for (;;) {
+    const times = columns.map(({ series }, k) => (next[k] < series.size ? series.timeAt(next[k]) : Infinity));
+    const time = Math.min(...times, Infinity);
+    if (time === Infinity) return `${lines.join("\r\n")}\r\n`;
+    const cells = columns.map(({ series }, k) => {
+      if (times[k] !== time) return "";
+      const value = series.valueAt(next[k]++);
+      return Number.isFinite(value) ? String(value) : "";
+    });
+    lines.push([Number(time.toPrecision(12)), Math.round(time * rateHz), ...cells].join(","));
+  }
+}
+
+/** @param {string} cell */
+const quoted = (cell) => (/[",\r\n]/.test(cell) ? `"${cell.replaceAll('"', '""')}"` : cell);

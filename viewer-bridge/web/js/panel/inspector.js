@@ -2,8 +2,7 @@
 // selection changes, and their texts change ten times a second at most. An empty selection costs nothing.
 
 import { find, make } from "../ui/dom.js";
-import { readable, trim } from "../ui/format.js";
-import { sceneUnits } from "../ui/units.js";
+import { readable, trim, sceneUnits } from "../ui/format.js";
 import { PIN } from "../net/wire.js";
 import { distanceOf, holderOf, inspectConstraint, inspectParticle } from "../state/inspection.js";
 import { ITEM_COLORS, constraintsAt, nameOf, parseItems } from "../state/selection.js";

@@ -1,13 +1,13 @@
 // The parameter panel: each row shows the value of the node and sends changes of the user. An older
 // answer never moves a slider while the user holds it.
 
-import { KINDS } from "../state/quantity.js";
-import { find, make } from "../ui/dom.js";
-import { SLIDER_STEPS, editable, hasBends, partsOf, positionOf, rangeOf, restoring, rowsOf, unitOf, valueAt, vectorOf, withSurfaces } from "./parameters.js";
 import { valueOf } from "../net/messages.js";
-import { unitIn } from "../ui/units.js";
+import { KINDS } from "../state/quantity.js";
 import { Strokes } from "../tools/tool.js";
-import { ValueField } from "./value-field.js";
+import { find, make } from "../ui/dom.js";
+import { unitIn } from "../ui/format.js";
+import { keyName } from "../ui/keys.js";
+import { editable, hasBends, partsOf, positionOf, rangeOf, restoring, rowsOf, SLIDER_STEPS, typedValue, unitOf, valueAt, vectorOf, withSurfaces } from "./parameters.js";
 
 /** @typedef {import("./parameters.js").Row} Row */
 /** @typedef {import("../net/messages.js").Values} Values */
@@ -246,5 +246,39 @@ export class Panel {
   unit(row, part = "all") {
     const { scene } = this.simulation;
     return unitIn(unitOf(row, scene?.shapes ?? [], part), scene?.unit ?? "m");
+  }
+}
+
+export class ValueField {
+  /** @param {Row} row @param {string} label for screen readers @param {{ onValue: (value: number | null) => void, onWrong: (text: string) => void, onUndo: () => void }} on */
+  constructor(row, label, { onValue, onWrong, onUndo }) {
+    this.input = make("input", { type: "text", inputmode: "decimal", class: "value", "aria-label": label, autocomplete: "off", spellcheck: "false" });
+    this.shown = "";
+    this.input.addEventListener("focus", () => this.input.select());
+    this.input.addEventListener("change", () => {
+      const value = typedValue(row, this.input.value);
+      if (value !== undefined) return onValue(value);
+      onWrong(this.input.value);
+      this.input.value = this.shown;
+    });
+    this.input.addEventListener("keydown", (event) => {
+      const { key } = event;
+      // The browser's own undo would show an older value than that of the node.
+      if ((event.ctrlKey || event.metaKey) && key.toLowerCase() === "z") event.preventDefault();
+      if (keyName(event) === "ctrl+z") {
+        if (this.input.value === this.shown) onUndo();
+        else this.input.value = this.shown;
+      }
+      // Escape leaves the field without a change.
+      if (key === "Escape") this.input.value = this.shown;
+      if (key === "Escape" || key === "Enter") this.input.blur();
+    });
+  }
+
+  /** Shows a value, unless the user is typing another one. @param {ParameterValue} value @param {string} [word] in place of "off" */
+  show(value, word = "off") {
+    const isTyped = this.input.matches(":focus") && this.input.value !== this.shown;
+    this.shown = typeof value === "number" ? editable(value) : word;
+    if (!isTyped && this.input.value !== this.shown) this.input.value = this.shown;
   }
 }

@@ -1,7 +1,7 @@
 // The logic of the parameter panel: rows, ranges, and the mapping between slider positions and values.
 // No DOM here.
 
-import { niceCeiling } from "../geometry/round.js";
+import { niceCeiling } from "../geometry/math.js";
 import { blockValues, toNumber, valueOf } from "../net/messages.js";
 import { ROWS } from "./tables.js";
 

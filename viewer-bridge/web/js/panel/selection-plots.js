@@ -3,9 +3,8 @@
 import { dot } from "../geometry/math.js";
 import { distanceOf, inspectConstraint, inspectParticle } from "../state/inspection.js";
 import { ITEM_COLORS, nameOf } from "../state/selection.js";
-import { sceneUnits } from "../ui/units.js";
-import { Plot } from "./plot.js";
-import { Series } from "./series.js";
+import { sceneUnits } from "../ui/format.js";
+import { Plot, Series } from "./plot.js";
 
 /** @typedef {import("../state/selection.js").Item} Item */
 

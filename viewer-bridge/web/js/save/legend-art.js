@@ -1,6 +1,6 @@
 // Draws the legends into a picture, as the page shows them.
 
-/** @typedef {import("../legend/legend-text.js").LegendText} LegendText */
+/** @typedef {import("../legend/legend.js").LegendText} LegendText */
 /** Colours of the page. @typedef {{ surface: string, line: string, text: string, soft: string }} LegendColors */
 /** A line of a legend, at the top left of the box. @typedef {{ kind: "title" | "line" | "ends" | "ramp" | "kind" | "arrow", y: number, texts: string[], color?: string, width?: number }} Row */
 

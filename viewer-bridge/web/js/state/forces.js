@@ -1,7 +1,6 @@
 // The forces of the frame as arrows, and the scale of their lengths.
 
-import { addScaled, dot, length, scale, add } from "../geometry/math.js";
-import { niceCeiling } from "../geometry/round.js";
+import { addScaled, dot, length, scale, add, niceCeiling } from "../geometry/math.js";
 
 /** @typedef {import("../geometry/math.js").Vec3} Vec3 */
 /** @typedef {import("./simulation.js").Simulation} Simulation */

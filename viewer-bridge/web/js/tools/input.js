@@ -1,15 +1,12 @@
 // Pointer and wheel input on the picture: a press starts a tool, two fingers move the view.
 
 import { clamp, length, subtract } from "../geometry/math.js";
-import { BrushTool } from "./brush.js";
-import { CarryTool } from "./carry.js";
-import { CutTool } from "./cut.js";
+import { BrushTool, CutTool } from "./strokes.js";
+import { CarryTool, anchorOf, solidAt } from "./carry.js";
 import { CLICK_MS, CLICK_PIXELS, PressTool } from "./press-tool.js";
 import { GrabTool } from "./grab.js";
-import { anchorOf, solidAt } from "./objects.js";
 import { Notches } from "./notches.js";
-import { togglePin, togglePins } from "./pin.js";
-import { itemAt } from "./select.js";
+import { togglePin, togglePins, itemAt } from "./click.js";
 import { REACH, depthUnder, particleAt } from "./tool.js";
 import { ViewTool } from "./view.js";
 

@@ -4,8 +4,7 @@ import { enable, find } from "./dom.js";
 import { MODES } from "../tools/input.js";
 import { CharacterKeys, listenToKeys, returnFocus } from "./keys.js";
 import { askOthers } from "./prompts.js";
-import { SceneLoader } from "./scene-loader.js";
-import { SceneMenu, neighbour } from "./scene-menu.js";
+import { SceneLoader, SceneMenu, neighbour } from "./scene-menu.js";
 
 /** @typedef {import("../tools/input.js").Mode} Mode */
 

@@ -47,3 +47,15 @@ export function sharpContext(canvas) {
 
 /** Value of a custom property of the style sheet. @param {string} name */
 export const cssColor = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+
+/** Time in ms in which the browser takes the content. */
+const KEPT_MS = 10_000;
+
+/** @param {Blob} content @param {string} name */
+export function save(content, name) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(content);
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), KEPT_MS);
+}

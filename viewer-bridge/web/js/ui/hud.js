@@ -1,8 +1,7 @@
 // The status line under the picture. It changes at most four times a second: nobody reads faster, and
 // screen readers announce every change.
 
-import { trim } from "./format.js";
-import { sceneUnits } from "./units.js";
+import { trim, sceneUnits } from "./format.js";
 
 const INTERVAL_MS = 250;
 

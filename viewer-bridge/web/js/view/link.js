@@ -38,3 +38,26 @@ export function formatLink(link) {
   for (const [name, isOn] of Object.entries(link.toggles)) fields.push(`show.${encodeURIComponent(name)}=${isOn ? 1 : 0}`);
   return fields.join("&");
 }
+
+/** Shows a pose, asks before a scene is loaded, and says that there is no such scene.
+ * @typedef {{ show(pose: CameraPose | null): void, ask(wanted: string, present: string): void, miss(wanted: string): void }} Follower */
+
+/** A link to another scene never loads it by itself: others may look at the one on show.
+ * @param {Link} link @param {import("../state/simulation.js").Simulation} simulation @param {Follower} follower */
+export function followLink({ scene: wanted, camera }, simulation, follower) {
+  let isFollowed = false;
+  const follow = () => {
+    const { hello, isAlive, isRecording, node, scene } = simulation;
+    if (isFollowed || hello === null || node === null || scene === null) return;
+    const isHere = wanted === null || wanted === scene.name || isRecording;
+    // The first scene can arrive before the news that its node runs.
+    if (!isHere && !isAlive) return;
+    isFollowed = true;
+    if (isHere) follower.show(camera);
+    else if (hello.scenes.some((one) => one.name === wanted)) follower.ask(wanted, scene.name);
+    else follower.miss(wanted);
+  };
+  // Runs before the first frame of the scene, when the view applies the linked pose.
+  simulation.on("scene", follow);
+  simulation.on("node", follow);
+}

@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { fitted } from "../../js/save/composition.js";
+import { fitted } from "../../js/save/picture.js";
 import { drawLegends, layOut, wrap } from "../../js/save/legend-art.js";
 
 const AREA = { width: 800, height: 600 };

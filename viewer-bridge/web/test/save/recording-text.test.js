@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { clock, describe, endsAfterMs, isRunning, losses, readableBytes, reasonAgainst, replayAddress } from "../../js/save/recording-text.js";
+import { clock, describe, endsAfterMs, isRunning, losses, readableBytes, reasonAgainst, replayAddress } from "../../js/save/recording.js";
 
 const RECORDING = { type: "recording", state: "recording", text: "", name: null, path: null, seconds: 83.9, snapshots: 2937, size_bytes: 8_123_456, lost: {} };
 const LIVE = { isConnected: true, isReplay: false, hasNode: true };

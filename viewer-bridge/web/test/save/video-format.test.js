@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { TYPES, bitsPerSecond, chooseType, endingOf, videoSize } from "../../js/save/video-format.js";
+import { TYPES, bitsPerSecond, chooseType, endingOf, videoSize } from "../../js/save/video.js";
 
 test("the most widely played format is chosen that the browser can write", () => {
   assert.equal(chooseType(() => true), TYPES[0]);

@@ -2,7 +2,7 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { niceFloor } from "../../js/geometry/round.js";
+import { niceFloor } from "../../js/geometry/math.js";
 import { ForceScale, arrowsOf } from "../../js/state/forces.js";
 import { Simulation } from "../../js/state/simulation.js";
 

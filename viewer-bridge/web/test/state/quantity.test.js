@@ -5,9 +5,9 @@ import { test } from "node:test";
 import { complianceOf, strainGains, tensionGains, valueAt } from "../../js/state/quantity.js";
 import { ValueScan } from "../../js/legend/value-scan.js";
 import { Topology, FAN_WORDS } from "../../js/state/topology.js";
-import { ScaleEnd, scaleOf, tensionNote } from "../../js/legend/color-legend.js";
-import { niceEnd } from "../../js/geometry/round.js";
-import { unitIn, unitsOf } from "../../js/ui/units.js";
+import { ScaleEnd, scaleOf, tensionNote } from "../../js/legend/legend.js";
+import { niceEnd } from "../../js/geometry/math.js";
+import { unitIn, unitsOf } from "../../js/ui/format.js";
 
 /** Constraints along the x axis from particle 0, with given lengths. */
 function scene({ restLengths, compliances, kinds = restLengths.map(() => 0) }) {

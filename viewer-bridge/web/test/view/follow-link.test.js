@@ -3,8 +3,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { Simulation } from "../../js/state/simulation.js";
-import { followLink } from "../../js/view/follow-link.js";
-import { parseLink } from "../../js/view/link.js";
+import { followLink, parseLink } from "../../js/view/link.js";
 
 const scene = {
   kind: "scene", epoch: 1, step: 0, particleCount: 0, constraintCount: 0, triangleCount: 0, isPlanar: false, min: [0, 0, 0], max: [1, 1, 1],

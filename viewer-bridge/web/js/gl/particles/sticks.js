@@ -1,10 +1,12 @@
 // Constraints as sticks. Each is one instanced quad around a capsule on the screen, because WebGL lines
 // are only one pixel wide.
 
+import { sameNumbers } from "../../geometry/math.js";
 import { CONSTRAINT } from "../../net/wire.js";
-import { STICK } from "../../state/topology.js";
-import { Program, UNITS } from "../context.js";
-import { BLUR, CORNER, HEADER, HEAT, LIGHT, PAINT, SCREEN, VALUES, positionReader, sunlight } from "../shaders.js";
+import { drawnSticks, STICK } from "../../state/topology.js";
+import { ArrayTexture, layouts, Program, UNITS } from "../context.js";
+import { BLUR, CORNER, HEADER, HEAT, LIGHT, PAINT, positionReader, SCREEN, sunlight, VALUES } from "../shaders.js";
+import { STICKS } from "../styles.js";
 
 /** Words per instance: two ends, rest length and gain as f32 bits, style, radius as a solid body as f32 bits. */
 const WORDS = 6;
@@ -201,5 +203,66 @@ export class Sticks {
     gl.bindVertexArray(this.vao);
     gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, this.drawn.length);
     gl.bindVertexArray(null);
+  }
+}
+
+/** Thin flat sticks of all listed constraints. */
+const THIN = { u_is_all: 1, u_radius: 0, u_round: 0 };
+/** In front of everything else, behind something, and in 2-D. */
+const VISIBLE = { ...THIN, u_forward: STICKS.solid.u_forward, u_opacity: 0.9 };
+const HIDDEN = { ...VISIBLE, u_opacity: 0.25 };
+const FLAT = { ...VISIBLE, u_forward: 0 };
+
+/** The constraints that show the shape: structural ones, or all if there are none. @param {import("../../net/wire.js").Scene} scene @param {number} limit */
+function ghostSticks(scene, limit) {
+  const drawn = drawnSticks(scene, limit);
+  const structural = drawn.filter((constraint) => scene.constraintKinds[constraint] === CONSTRAINT.structural);
+  return structural.length > 0 ? structural : drawn;
+}
+
+export class GhostSticks {
+  /** @param {WebGL2RenderingContext} gl @param {Sticks} sticks for positions as f32, which it fills @param {import("../../state/topology.js").Topology} topology @param {number} limit number of sticks at most */
+  constructor(gl, sticks, { scene }, limit) {
+    this.gl = gl;
+    this.scene = scene;
+    this.sticks = sticks;
+    this.positions = new ArrayTexture(gl, UNITS.u_positions, layouts(gl).f32x3, scene.particleCount);
+    this.styles = Uint8Array.from(scene.constraintKinds);
+    this.gains = new Float32Array(scene.constraintCount);
+    /** Constraints that the ghost lacks. */
+    this.hidden = new Uint32Array(0);
+    this.sticks.setSticks({ scene, styles: this.styles, gains: this.gains }, ghostSticks(scene, limit), new Float32Array(scene.constraintCount));
+  }
+
+  /** @param {import("../../net/wire.js").Ghost} ghost */
+  write(ghost) {
+    if (ghost.positions.length > 0) this.positions.write(ghost.positions);
+    if (sameNumbers(ghost.hidden, this.hidden)) return;
+    this.hidden = ghost.hidden.slice();
+    this.styles.set(this.scene.constraintKinds);
+    for (const constraint of this.hidden) this.styles[constraint] |= STICK.isGone;
+    this.sticks.update(this);
+  }
+
+  /** Draws over the picture. Afterwards, the positions are those of `others` again.
+   * @param {import("../context.js").Uniforms} sceneStyle @param {ArrayTexture} others @param {{ isFlat: boolean }} scene */
+  draw(sceneStyle, others, { isFlat }) {
+    const { gl } = this;
+    this.positions.bind();
+    if (!isFlat) {
+      gl.enable(gl.DEPTH_TEST);
+      gl.depthMask(false);
+      gl.depthFunc(gl.GREATER);
+      this.sticks.draw(sceneStyle, HIDDEN);
+      gl.depthMask(true);
+      gl.depthFunc(gl.LEQUAL);
+    }
+    this.sticks.draw(sceneStyle, isFlat ? FLAT : VISIBLE);
+    others.bind();
+  }
+
+  delete() {
+    this.positions.delete();
+    this.sticks.clear();
   }
 }

@@ -1,14 +1,20 @@
-// The legend of the colours: the choice of the quantity, its scale, its extremes, and what is not known.
+// The legends: the scale of the colours, and the scale of the force arrows.
 
-import { find, make, sharpContext } from "../ui/dom.js";
-import { readable } from "../ui/format.js";
-import { sceneUnits } from "../ui/units.js";
-import { niceEnd } from "../geometry/round.js";
-import { HEAT_STOPS, KIND_COLORS } from "../gl/theme.js";
-import { KINDS, strainGains, tensionGains } from "../state/quantity.js";
+import { niceEnd, niceFloor } from "../geometry/math.js";
+import { FORCE_COLOR, HEAT_STOPS, KIND_COLORS } from "../gl/theme.js";
 import { valueOf } from "../net/messages.js";
-import { shownTexts } from "./legend-text.js";
+import { KINDS, strainGains, tensionGains } from "../state/quantity.js";
+import { find, make, sharpContext } from "../ui/dom.js";
+import { readable, sceneUnits } from "../ui/format.js";
 import { ValueScan } from "./value-scan.js";
+
+/**
+ * `ends` are the values below the ramp of colours, from its left to its right end.
+ * @typedef {{ title: string, ends?: string[], kinds?: { text: string, color: string }[], arrow?: { length: number, color: string }, lines: string[] }} LegendText
+ */
+
+/** The texts of elements that are shown and not empty. @param {HTMLElement[]} elements */
+export const shownTexts = (...elements) => elements.filter((one) => !one.hidden).map((one) => one.textContent ?? "").filter((text) => text !== "");
 
 /** @typedef {import("../state/quantity.js").Quantity} Quantity */
 /** @typedef {import("./value-scan.js").Extremes} Extremes */
@@ -208,7 +214,7 @@ export class ColorLegend {
     return `${quantity === "tension" ? tensionNote(found, this.app.simulation.node?.method ?? null) : ""}${rounding}`.trim();
   }
 
-  /** The legend for a picture, or null if it is not shown. @returns {import("./legend-text.js").LegendText | null} */
+  /** The legend for a picture, or null if it is not shown. @returns {LegendText | null} */
   describe() {
     if (this.element.hidden) return null;
     const title = this.choice.selectedOptions[0]?.textContent ?? "";
@@ -283,4 +289,49 @@ function drawRamp(canvas) {
   HEAT_STOPS.forEach((color, stop) => ramp.addColorStop(stop / (HEAT_STOPS.length - 1), color));
   context.fillStyle = ramp;
   context.fillRect(0, 0, width, height);
+}
+
+/** Longest arrow of the legend, in CSS pixels. */
+const LENGTH_MAX = 120;
+
+export class ForceLegend {
+  /** @param {import("../tools/tool.js").App} app */
+  constructor(app) {
+    this.app = app;
+    this.legend = find("force-legend", HTMLElement);
+    this.arrow = find("force-arrow", HTMLElement);
+    this.scale = find("force-scale", HTMLOutputElement);
+  }
+
+  /** Shows the scale at the middle of the view. */
+  tick() {
+    const { simulation, renderer } = this.app;
+    const isWanted = renderer.toggles.forces && simulation.isConnected;
+    if (this.legend.hidden === isWanted) this.legend.hidden = !isWanted;
+    if (isWanted) this.show();
+  }
+
+  /** The legend for a picture, or null if it is not shown. @returns {LegendText | null} */
+  describe() {
+    if (this.legend.hidden) return null;
+    return { title: `Force ${this.scale.textContent}`, arrow: { length: Number.parseFloat(this.arrow.style.width) || 0, color: FORCE_COLOR }, lines: [] };
+  }
+
+  show() {
+    const { camera, renderer, simulation } = this.app;
+    const unitsPerNewton = renderer.unitsPerNewton();
+    const newtonsPerPixel = camera.unitsPerPixel(camera.target, renderer.viewport) / unitsPerNewton;
+    const newtons = niceFloor(LENGTH_MAX * newtonsPerPixel);
+    const width = simulation.forces === null || unitsPerNewton === 0 ? 0 : newtons / newtonsPerPixel;
+    setText(this.scale, width === 0 ? absence(simulation) : readable(newtons, sceneUnits(simulation.scene).force));
+    const pixels = `${width.toFixed(1)}px`;
+    if (this.arrow.style.width !== pixels) this.arrow.style.width = pixels;
+  }
+}
+
+/** Says why there are no arrows. @param {import("../state/simulation.js").Simulation} simulation */
+function absence({ forces, isReplay, isPaused }) {
+  if (forces !== null) return "no force";
+  if (isReplay) return "none recorded of this step";
+  return isPaused ? "after the next step" : "waiting";
 }
