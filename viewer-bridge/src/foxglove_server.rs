@@ -5,6 +5,7 @@
 //! of pages.
 
 mod callbacks;
+mod options;
 mod parameters;
 mod playback;
 mod proxy;
@@ -15,4 +16,5 @@ mod sink;
 #[cfg(test)]
 mod tests;
 
-pub use server::{FoxgloveOptions, FoxglovePermission, FoxgloveServer, FoxgloveServerError};
+pub use options::{FoxgloveOptions, FoxglovePermission, FoxgloveServerError};
+pub use server::FoxgloveServer;

@@ -3,6 +3,7 @@
 //!
 //! `UPDATE_GOLDEN=1` rewrites the files; review the difference.
 
+mod protocol_page;
 mod tables;
 mod texts;
 

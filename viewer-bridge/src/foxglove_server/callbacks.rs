@@ -13,9 +13,9 @@ use foxglove::websocket::{
 use serde::Deserialize;
 use sim_contract::Action;
 
+use super::options::FoxglovePermission;
 use super::publisher::Publisher;
 use super::request_bridge::{ANY_CLIENT, RequestBridge};
-use super::server::FoxglovePermission;
 use crate::limits::STEPS_AT_ONCE_MAX;
 use crate::request::{RequestKind, RequestSender};
 

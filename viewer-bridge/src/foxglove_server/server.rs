@@ -5,17 +5,15 @@
 //! network, and the public address belongs to the same HTTP server as that of the pages, with the same
 //! limits. A [`Proxy`] forwards the messages between the two.
 
-use std::net::{Ipv4Addr, SocketAddr};
+use std::net::Ipv4Addr;
 use std::sync::Arc;
 
 use foxglove::websocket::Capability;
-use foxglove::{Context, FoxgloveError, WebSocketServer};
-use thiserror::Error;
+use foxglove::{Context, WebSocketServer};
 use tokio::time::timeout;
 
-use super::callbacks::ClientEvents;
-use super::callbacks::ParameterRequests;
-use super::callbacks::services;
+use super::callbacks::{ClientEvents, ParameterRequests, services};
+use super::options::{FoxgloveOptions, FoxglovePermission, FoxgloveServerError};
 use super::proxy::Proxy;
 use super::publisher::Publisher;
 use super::request_bridge::RequestBridge;
@@ -25,8 +23,7 @@ use crate::request::RequestSender;
 use crate::shutdown::Shutdown;
 use crate::sink::Sink;
 use crate::socket::guard::{Guard, guarded};
-use crate::socket::listen::{HttpListener, client_permits, remedy};
-use crate::source::recording_times::RecordingTimes;
+use crate::socket::listen::{HttpListener, client_permits};
 
 /// A Foxglove server that listens.
 #[derive(Debug)]
@@ -132,70 +129,4 @@ fn secret_address() -> Result<Ipv4Addr, getrandom::Error> {
     let [_, b, c, d] = getrandom::u32()?.to_le_bytes();
     // The last byte excludes the address of the network and its broadcast address.
     Ok(Ipv4Addr::new(127, b, c, d.clamp(1, 254)))
-}
-
-/// Options of a Foxglove server.
-#[derive(Debug, Clone)]
-pub struct FoxgloveOptions {
-    /// Address; port 0 is any free port.
-    pub listen: SocketAddr,
-    /// Origins of web pages that may connect, as browsers write them.
-    pub origins: Vec<String>,
-    /// Rights of the clients.
-    pub permission: FoxglovePermission,
-    /// Times of the recording on show, if the source is one.
-    pub recording: Option<RecordingTimes>,
-}
-
-/// Rights of Foxglove clients.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum FoxglovePermission {
-    /// Clients only read.
-    ReadOnly,
-    /// Clients may publish commands, call services and set parameters.
-    Commands,
-}
-
-impl FoxgloveOptions {
-    /// Checks that only this host can reach an address.
-    ///
-    /// # Errors
-    /// Other machines can reach the address.
-    pub fn check_address(address: SocketAddr) -> Result<(), FoxgloveServerError> {
-        if address.ip().is_loopback() {
-            Ok(())
-        } else {
-            Err(FoxgloveServerError::NotLoopback { address })
-        }
-    }
-}
-
-/// The reason for which a Foxglove server does not start.
-#[derive(Debug, Error)]
-pub enum FoxgloveServerError {
-    /// Other machines can reach the address.
-    #[error(
-        "{address} can be reached from other machines, and the Foxglove protocol cannot \
-         authenticate clients; listen on loopback and forward the port, as in \
-         `ssh -L {port}:127.0.0.1:{port} HOST`",
-        port = address.port()
-    )]
-    NotLoopback {
-        /// The address.
-        address: SocketAddr,
-    },
-    /// The address cannot be used.
-    #[error("cannot listen at {address}: {cause}{}", remedy(cause, "--foxglove", address))]
-    Listen {
-        /// The address.
-        address: SocketAddr,
-        /// Error of the system.
-        cause: std::io::Error,
-    },
-    /// The secret address needs a random number.
-    #[error("the system provides no random number: {0}")]
-    NoRandomNumber(getrandom::Error),
-    /// The library cannot start.
-    #[error("starting the Foxglove server: {0}")]
-    Library(#[from] FoxgloveError),
 }

@@ -7,8 +7,7 @@ use sim_contract::ParameterValues;
 
 use super::from_page::Choice;
 use super::refusal::Refusal;
-use super::timeline::GhostText;
-use super::timeline::{HistoryText, Playback, Timeline};
+use super::timeline::{GhostText, HistoryText, Playback, Timeline};
 use crate::limits;
 use crate::scene::catalog::SceneEntry;
 use crate::scene::summary::ColliderSurface;

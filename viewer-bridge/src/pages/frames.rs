@@ -8,9 +8,8 @@ use crate::message::Choice;
 use crate::sink::State;
 use crate::wire::{
     Colliders, Forces, Format, FrameHead, FrameLimits, Ghost, Inspected, Scene, Speeds, Stamp,
-    encode_frame, frame_flag,
+    encode_frame, frame_flag, microseconds, to_f32,
 };
-use crate::wire::{microseconds, to_f32};
 
 /// The newest state, in every format that a page waited for.
 #[derive(Debug, Clone, Default)]

@@ -16,8 +16,7 @@ use tokio::sync::{mpsc, watch};
 
 use super::connection::{Connection, Credit, SentFrames, Subscription};
 pub use super::frames::Formats;
-use super::frames::{FrameEncoder, Wanted};
-use super::frames::{FrameProperties, FrameSet};
+use super::frames::{FrameEncoder, FrameProperties, FrameSet, Wanted};
 use super::history::{History, PastMessages, Viewer};
 use crate::limits::{PROTOCOL, RELIABLE_QUEUED_MAX};
 use crate::message::{
@@ -27,8 +26,7 @@ use crate::request::{ClientId, RequestKind, RequestSender};
 use crate::scene::catalog::SceneEntry;
 use crate::sink::{Demand, Sink, State, Torn, Update};
 use crate::source::recording_files::names_in;
-use crate::wire::count_u32;
-use crate::wire::{Stamp, Statistics, Tear};
+use crate::wire::{Stamp, Statistics, Tear, count_u32};
 
 /// Latched messages, in the order in which a new page receives them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

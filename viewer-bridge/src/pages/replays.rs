@@ -15,10 +15,9 @@ use crate::message::Mode;
 use crate::request::requests;
 use crate::shutdown::Shutdown;
 use crate::sink::Sinks;
-use crate::source::Source;
 use crate::source::recording_files::path_of;
 use crate::source::replay::{GhostChoice, InitialPlayback, Replay};
-use crate::source::start_source;
+use crate::source::{Source, start_source};
 
 /// The open recordings of a folder.
 #[derive(Debug)]

@@ -3,8 +3,7 @@
 use bytes::Bytes;
 use sim_contract::ParticleState;
 
-use super::writer::Writer;
-use super::writer::{Kind, Stamp};
+use super::writer::{Kind, Stamp, Writer};
 
 /// Encoding of positions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -4,9 +4,7 @@ use bytemuck::bytes_of;
 use bytes::Bytes;
 use sim_contract::{ColliderState, ForceRow, ParticleState, TornConstraint};
 
-use super::writer::Writer;
-use super::writer::count_u32;
-use super::writer::{Kind, Stamp};
+use super::writer::{Kind, Stamp, Writer, count_u32};
 
 /// A change of the list of torn constraints: keeps its first entries and replaces the rest.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]

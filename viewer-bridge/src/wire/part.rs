@@ -7,9 +7,7 @@ use bytes::Bytes;
 use flate2::Compression;
 use flate2::write::DeflateEncoder;
 
-use super::writer::Writer;
-use super::writer::count_u32;
-use super::writer::{Kind, Stamp};
+use super::writer::{Kind, Stamp, Writer, count_u32};
 use crate::limits::PART_SIZE_BYTES;
 
 /// A piece of a binary message.

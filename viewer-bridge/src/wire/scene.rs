@@ -6,8 +6,7 @@ use sim_contract::{ConstraintState, ParticleState, Triangle};
 use sim_solver::scene::{ColliderMesh, ColliderMeshes};
 
 use super::frame::Bounds;
-use super::writer::Writer;
-use super::writer::{Kind, Stamp};
+use super::writer::{Kind, Stamp, Writer};
 
 /// The bits of a scene's flags.
 pub mod scene_flag {

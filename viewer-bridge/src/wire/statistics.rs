@@ -2,8 +2,7 @@
 
 use bytes::Bytes;
 
-use super::writer::Writer;
-use super::writer::{Kind, Stamp};
+use super::writer::{Kind, Stamp, Writer};
 
 /// The bits of the statistics' flags.
 pub mod statistics_flag {

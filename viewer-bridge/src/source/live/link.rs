@@ -13,11 +13,9 @@ use sim_contract::{
 use super::actions::CommandContext;
 use super::carrier::{Carrier, Place};
 use super::dispatch::Dispatch;
-use super::newest_state::Updates;
-use super::newest_state::{LoadedState, NewestState};
+use super::newest_state::{LoadedState, NewestState, Updates};
 use super::outcomes::{HeldByClients, handle_outcomes};
-use super::status::node_text;
-use super::status::statistics;
+use super::status::{node_text, statistics};
 use super::undo::kept_state::Keyframes;
 use super::undo::stack::Change;
 use super::undo::{Undo, UndoRequest};

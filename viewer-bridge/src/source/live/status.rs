@@ -6,8 +6,7 @@ use super::newest_state::LoadedState;
 use crate::message::{Node, NodeState};
 use crate::scene::measure::{measure, torn_flags};
 use crate::source::shown_state::ShownState;
-use crate::wire::{Percentiles, Stamp, Statistics, statistics_flag};
-use crate::wire::{microseconds, to_f32};
+use crate::wire::{Percentiles, Stamp, Statistics, microseconds, statistics_flag, to_f32};
 
 /// Collects the statistics of the node and measures the state.
 pub(super) fn statistics(

@@ -8,8 +8,9 @@ use super::open::Recording;
 use super::playhead::Playhead;
 use crate::scene::measure::{measure, torn_flags};
 use crate::source::shown_state::ShownState;
-use crate::wire::{Percentiles, Stamp, Statistics, statistics_flag};
-use crate::wire::{count_u32, microseconds, to_f32};
+use crate::wire::{
+    Percentiles, Stamp, Statistics, count_u32, microseconds, statistics_flag, to_f32,
+};
 
 /// Collects the recorded statistics and measures the state.
 pub(super) fn statistics(
