@@ -23,7 +23,7 @@ use tokio_tungstenite::{WebSocketStream, client_async_with_config};
 use crate::limits::{CLIENTS_MAX, CONNECTION_TIMEOUT, SILENCE_MAX};
 use crate::socket::listen::ClientPermits;
 use crate::socket::peer::{End, FULL, GOING_AWAY, Peer, TOO_SLOW, limit};
-use crate::socket::pending_connections::Place;
+use crate::socket::pending_connections::PendingConnection;
 
 /// Forwards messages between clients and the library.
 #[derive(Debug)]
@@ -63,7 +63,7 @@ impl Proxy {
 /// Connects to the library first, so that the client receives the library's choice of subprotocol.
 async fn upgrade(
     State(state): State<Arc<ProxyState>>,
-    Extension(place): Extension<Arc<Place>>,
+    Extension(place): Extension<Arc<PendingConnection>>,
     headers: HeaderMap,
     upgrade: WebSocketUpgrade,
 ) -> Response {
@@ -111,7 +111,7 @@ struct Forwarding {
 impl Forwarding {
     /// Forwards messages in both directions until one side ends. The connection keeps its place in the
     /// pending connections until it is a client.
-    async fn run(mut self, place: Arc<Place>, clients: &ClientPermits) {
+    async fn run(mut self, place: Arc<PendingConnection>, clients: &ClientPermits) {
         match place.while_held(self.admit(clients)).await {
             Some(Ok(_permit)) => {
                 drop(place);

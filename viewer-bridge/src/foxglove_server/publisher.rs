@@ -47,7 +47,7 @@ pub(super) struct Publisher {
     recording: Option<RecordingTimes>,
     state: Mutex<PublisherState>,
     /// Subscriptions whose clients have not received the earlier messages of the topic.
-    new_subscriptions: Mutex<Vec<Subscription>>,
+    new_subscriptions: Mutex<Vec<NewSubscription>>,
     /// The next state must be sent even if it was sent before.
     is_state_due: AtomicBool,
     /// The next state must be drawn on `/scene`, whenever the last one was.
@@ -57,7 +57,7 @@ pub(super) struct Publisher {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Subscription {
+struct NewSubscription {
     topic: Topic,
     sink: SinkId,
 }
@@ -147,7 +147,7 @@ impl Publisher {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn new_subscriptions(&self) -> MutexGuard<'_, Vec<Subscription>> {
+    fn new_subscriptions(&self) -> MutexGuard<'_, Vec<NewSubscription>> {
         self.new_subscriptions.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -183,9 +183,9 @@ impl Publisher {
         let mut subscriptions = self.new_subscriptions();
         if let (Some(topic), Some(sink)) = (Topic::from_name(topic), sink)
             && subscriptions.len() < NEW_SUBSCRIPTIONS_MAX
-            && !subscriptions.contains(&Subscription { topic, sink })
+            && !subscriptions.contains(&NewSubscription { topic, sink })
         {
-            subscriptions.push(Subscription { topic, sink });
+            subscriptions.push(NewSubscription { topic, sink });
         }
     }
 
@@ -380,7 +380,7 @@ impl Publisher {
     /// Sends the earlier messages to the clients that have subscribed since the last state.
     fn serve_new_subscriptions(&self, state: &mut PublisherState, step: u64) {
         let subscriptions = std::mem::take(&mut *self.new_subscriptions());
-        for Subscription { topic, sink } in subscriptions {
+        for NewSubscription { topic, sink } in subscriptions {
             let row = match topic {
                 Topic::Tf => {
                     if let Some(load) = &state.load {

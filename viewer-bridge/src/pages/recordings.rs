@@ -18,7 +18,7 @@ use sim_contract::console::note;
 use super::hub::{Hub, lock};
 use crate::message::{NodeState, RecordingState, RecordingText, Refusal};
 use crate::source::recording_files;
-use recorder_process::{Line, Progress, RecorderId, RecorderProcess, Report, StopReason};
+use recorder_process::{Line, Progress, RecorderId, RecorderProcess, RecorderReport, StopReason};
 
 /// Remedy for a folder that cannot hold a recording.
 const CHOOSE_A_FOLDER: &str =
@@ -199,7 +199,7 @@ impl Recordings {
     }
 
     /// Adds the last numbers. The page learns of them with the end.
-    fn show_report(&self, path: &Path, report: Report) -> String {
+    fn show_report(&self, path: &Path, report: RecorderReport) -> String {
         let mut present = lock(&self.present);
         let shown = &mut present.shown;
         shown.name = recording_files::name_of(path);

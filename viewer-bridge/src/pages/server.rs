@@ -21,7 +21,7 @@ use crate::shutdown::Shutdown;
 use crate::socket::guard::{Guard, TokenDemand, guarded};
 use crate::socket::listen::{HttpListener, client_permits, remedy};
 use crate::socket::peer::limit;
-use crate::socket::pending_connections::Place;
+use crate::socket::pending_connections::PendingConnection;
 
 /// Options of a server.
 #[derive(Debug)]
@@ -152,7 +152,7 @@ async fn replay_file(
 
 async fn socket(
     State(state): State<Arc<ServerState>>,
-    Extension(place): Extension<Arc<Place>>,
+    Extension(place): Extension<Arc<PendingConnection>>,
     upgrade: WebSocketUpgrade,
 ) -> Response {
     limit(upgrade)
@@ -161,7 +161,7 @@ async fn socket(
 
 async fn replay_socket(
     State(state): State<Arc<ServerState>>,
-    Extension(place): Extension<Arc<Place>>,
+    Extension(place): Extension<Arc<PendingConnection>>,
     Path(name): Path<String>,
     upgrade: WebSocketUpgrade,
 ) -> Response {

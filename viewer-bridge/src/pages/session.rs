@@ -18,7 +18,7 @@ use crate::request::{ClientId, RequestKind};
 use crate::shutdown::Shutdown;
 use crate::socket::guard::Guard;
 use crate::socket::peer::{End, FULL, GOING_AWAY, Peer, TOO_SLOW};
-use crate::socket::pending_connections::Place;
+use crate::socket::pending_connections::PendingConnection;
 
 /// A message is malformed.
 const MALFORMED: u16 = 4400;
@@ -74,7 +74,7 @@ impl Sessions {
 pub(super) async fn serve(
     socket: WebSocket,
     sessions: &Sessions,
-    place: Arc<Place>,
+    place: Arc<PendingConnection>,
     recording: Option<&str>,
 ) {
     let mut peer = Peer::new(socket);

@@ -21,7 +21,7 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::Semaphore;
 use tokio::time::{sleep, timeout};
 
-use super::pending_connections::{PendingConnections, Place};
+use super::pending_connections::{PendingConnection, PendingConnections};
 use super::rate_limit::{BYTES, Throttled};
 use crate::limits::{
     ACCEPT_PAUSE, CLIENTS_MAX, CONNECTION_TIMEOUT, DESCRIPTORS_PER_VISITOR, DESCRIPTORS_RESERVED,
@@ -103,7 +103,7 @@ async fn accept(listener: &TcpListener, router: &Router, shutdown: &Shutdown) {
 
 /// Serves the requests of one connection. Each of them carries its place among the pending connections, which a request
 /// for a socket keeps until the socket belongs to a client.
-async fn serve_connection(stream: TcpStream, router: Router, place: Place) {
+async fn serve_connection(stream: TcpStream, router: Router, place: PendingConnection) {
     // Without the option, small messages are only delayed.
     let _set = stream.set_nodelay(true);
     let place = Arc::new(place);

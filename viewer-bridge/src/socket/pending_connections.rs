@@ -39,7 +39,7 @@ struct Visitor {
 
 /// A place among the pending connections. Dropping it makes room for another connection.
 #[derive(Debug)]
-pub(crate) struct Place {
+pub(crate) struct PendingConnection {
     pending: Arc<PendingConnections>,
     number: u64,
     /// Closed when the connection must make room.
@@ -87,7 +87,7 @@ impl PendingConnections {
     }
 
     /// Returns a place for a connection from this address. Another connection makes room if necessary.
-    pub(super) async fn admit(self: &Arc<Self>, address: IpAddr) -> Place {
+    pub(super) async fn admit(self: &Arc<Self>, address: IpAddr) -> PendingConnection {
         if self.places.available_permits() == 0 {
             self.make_room();
             sleep(EVICTION_PERIOD).await;
@@ -101,11 +101,11 @@ impl PendingConnections {
         let activity = visitors.next_activity();
         let visitor = Visitor { network: network(address), activity, _eviction: sender };
         visitors.by_number.insert(number, visitor);
-        Place { pending: Arc::clone(self), number, eviction, _permit: permit }
+        PendingConnection { pending: Arc::clone(self), number, eviction, _permit: permit }
     }
 }
 
-impl Place {
+impl PendingConnection {
     /// Notes that the connection does something.
     pub(super) fn note_activity(&self) {
         let mut visitors = self.pending.visitors();
@@ -131,7 +131,7 @@ impl Place {
     }
 }
 
-impl Drop for Place {
+impl Drop for PendingConnection {
     fn drop(&mut self) {
         self.pending.visitors().by_number.remove(&self.number);
     }
@@ -156,11 +156,11 @@ mod tests {
     use super::*;
 
     /// Admits a connection that needs no other to end first.
-    fn admit(pending: &Arc<PendingConnections>, address: &str) -> Place {
+    fn admit(pending: &Arc<PendingConnections>, address: &str) -> PendingConnection {
         pending.admit(address.parse().unwrap()).now_or_never().unwrap()
     }
 
-    fn is_evicted(place: &Place) -> bool {
+    fn is_evicted(place: &PendingConnection) -> bool {
         place.evicted().now_or_never().is_some()
     }
 

@@ -24,7 +24,7 @@ const ERROR: &str = "error: ";
 #[serde(untagged)]
 pub(super) enum Line {
     /// The last one.
-    Report(Report),
+    Report(RecorderReport),
     /// Four times a second.
     Progress(Progress),
 }
@@ -40,7 +40,7 @@ pub(super) struct Progress {
 
 /// The report at the end.
 #[derive(Debug, Deserialize)]
-pub(super) struct Report {
+pub(super) struct RecorderReport {
     pub(super) snapshots: u64,
     pub(super) lost: BTreeMap<String, u64>,
     pub(super) stop_reason: StopReason,

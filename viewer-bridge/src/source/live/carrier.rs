@@ -32,7 +32,7 @@ pub(super) struct Carrier {
 
 /// The state in which an object is lifted.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Place<'a> {
+pub(super) struct LiftState<'a> {
     pub(super) state: &'a LoadedState<'a>,
     pub(super) colliders: &'a [ColliderState],
 }
@@ -78,7 +78,7 @@ impl Carrier {
         &mut self,
         client: ClientId,
         object: Object,
-        place: Place<'_>,
+        place: LiftState<'_>,
     ) -> Result<(), Refusal> {
         let known = self.objects.get(&object);
         if known.is_some_and(|one| one.client.is_some_and(|other| other != client)) {
@@ -246,7 +246,7 @@ fn move_to(object: Object, Pose { translation, rotation }: Pose) -> Action {
     }
 }
 
-impl Place<'_> {
+impl LiftState<'_> {
     /// Returns the present pose of an object, relative to that at load.
     fn pose(&self, object: Object) -> Result<Pose, Refusal> {
         let poses = &self.state.load.summary.poses;

@@ -25,9 +25,9 @@ pub(super) struct Dispatch {
     open: BTreeMap<u64, OpenCommand>,
     last_command: u64,
     /// Actions that wait for room in the node's queue.
-    outbox: VecDeque<Part>,
+    outbox: VecDeque<QueuedAction>,
     /// Actions without an outcome, by their sequence number.
-    sent: BTreeMap<u64, Part>,
+    sent: BTreeMap<u64, QueuedAction>,
 }
 
 /// The owner of a grab.
@@ -50,7 +50,7 @@ pub(super) struct Origin {
 
 /// An action of a command.
 #[derive(Debug, Clone, Copy)]
-struct Part {
+struct QueuedAction {
     /// Number of the command; `None` if no client waits for the outcome.
     command: Option<u64>,
     action: Action,
@@ -105,10 +105,11 @@ impl Dispatch {
     /// object.
     pub(super) fn add_moves(&mut self, moves: Vec<Action>) {
         for action in moves {
-            let is_outdated =
-                |part: &Part| part.command.is_none() && is_same_object(&part.action, &action);
+            let is_outdated = |part: &QueuedAction| {
+                part.command.is_none() && is_same_object(&part.action, &action)
+            };
             self.outbox.retain(|part| !is_outdated(part));
-            self.outbox.push_back(Part { command: None, action });
+            self.outbox.push_back(QueuedAction { command: None, action });
         }
     }
 
@@ -119,7 +120,7 @@ impl Dispatch {
         let deadline_ns = monotonic_ns() + timeout_ns;
         let command = OpenCommand { client, deadline_ns, open_count: parts.len(), outcome };
         self.open.insert(number, command);
-        let parts = parts.into_iter().map(|action| Part { command: Some(number), action });
+        let parts = parts.into_iter().map(|action| QueuedAction { command: Some(number), action });
         self.outbox.extend(parts);
     }
 
@@ -279,7 +280,7 @@ impl Dispatch {
     /// applied or is on its way.
     fn forget_lost_grab(&mut self, particle: u32) {
         let is_applied = self.grabs.get(&particle).is_some_and(|grab| grab.is_applied);
-        let is_grab = |part: &Part| matches!(part.action, Action::Grab { particle: grabbed, .. } if grabbed == particle);
+        let is_grab = |part: &QueuedAction| matches!(part.action, Action::Grab { particle: grabbed, .. } if grabbed == particle);
         if !is_applied && !self.sent.values().chain(&self.outbox).any(is_grab) {
             self.grabs.remove(&particle);
         }
@@ -366,6 +367,6 @@ fn is_same_object(a: &Action, b: &Action) -> bool {
 }
 
 /// Releases a particle whose client cannot do it.
-fn release(particle: u32) -> Part {
-    Part { command: None, action: Action::Release { particle, force: false } }
+fn release(particle: u32) -> QueuedAction {
+    QueuedAction { command: None, action: Action::Release { particle, force: false } }
 }

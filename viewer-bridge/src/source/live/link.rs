@@ -11,7 +11,7 @@ use sim_contract::{
 };
 
 use super::actions::CommandContext;
-use super::carrier::{Carrier, Place};
+use super::carrier::{Carrier, LiftState};
 use super::dispatch::Dispatch;
 use super::newest_state::{LoadedState, NewestState, Updates};
 use super::outcomes::{HeldByClients, handle_outcomes};
@@ -270,7 +270,7 @@ impl Link {
         match command.kind {
             CommandKind::Lift { epoch, .. } if epoch != shown.epoch() => Err(Refusal::StaleEpoch),
             CommandKind::Lift { object, index, .. } => {
-                let place = Place { state: &state, colliders: shown.colliders() };
+                let place = LiftState { state: &state, colliders: shown.colliders() };
                 let object = object.at(index);
                 self.carrier.lift(client, object, place)?;
                 let known = (&self.keyframes, &*self.catalog);

@@ -63,7 +63,7 @@ impl Stage {
     }
 
     fn lift(&self, carrier: &mut Carrier, client: ClientId, object: Object) -> Result<(), Refusal> {
-        carrier.lift(client, object, Place { state: &self.state(), colliders: &self.colliders })
+        carrier.lift(client, object, LiftState { state: &self.state(), colliders: &self.colliders })
     }
 
     /// Makes the steps that follow, one by one, and returns the translation of each move.
