@@ -101,7 +101,7 @@ fn size_of_number(name: &str) -> usize {
         "u16" => 2,
         "u32" | "f32" => 4,
         "u64" | "f64" => 8,
-        other => panic!("{other} is no number"),
+        other => panic!("{other} is not the name of a number"),
     }
 }
 
