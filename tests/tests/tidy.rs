@@ -12,8 +12,9 @@ mod module_graph;
 /// Every crate also uses `build-features`, which has no code.
 const ARROWS: [(&str, &[&str]); 12] = [
     ("sim-types", &[]),
+    ("sim-messages", &["sim-types"]),
     ("sim-solver", &["sim-types"]),
-    ("sim-contract", &["iceoryx2", "sim-types"]),
+    ("sim-contract", &["iceoryx2", "sim-messages"]),
     ("sim-c", &["sim-contract"]),
     ("catenary-python", &["recording", "sim-contract", "sim-solver"]),
     ("sim-cli", &["sim-contract", "sim-types"]),

@@ -125,7 +125,8 @@ fn generate() -> String {
         ..Config::default()
     };
     config.parse.parse_deps = true;
-    config.parse.include = Some(vec!["sim-contract".to_owned(), "sim-types".to_owned()]);
+    config.parse.include =
+        Some(["sim-contract", "sim-messages", "sim-types"].map(str::to_owned).to_vec());
     config.export.include = TYPES.iter().map(|(rust, _)| (*rust).to_owned()).collect();
     // Their constants make them opaque types.
     config.export.exclude = ["Action", "NumberRange", "ParticleFlags"].map(str::to_owned).to_vec();

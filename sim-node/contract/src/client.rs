@@ -11,35 +11,30 @@ pub(crate) mod request;
 pub(crate) mod restoring;
 pub(crate) mod state;
 pub(crate) mod tap;
-pub(crate) mod torn;
 pub(crate) mod views;
 pub(crate) mod watch;
 
 use std::mem;
 use std::time::Duration;
 
+use sim_messages::{
+    Action, BendState, CLIENT_ID_END, ColliderState, CollidersHeader, ConstraintState, LoadHeader,
+    NodeStatus, Outcome, ParameterState, ParametersHeader, ParticleState, Reason, SnapshotHeader,
+    TearsHeader, Torn, TornConstraint, Triangle, allowed_indices,
+};
+
 use crate::client::forces::{ForcesReader, Search};
 use crate::client::lockstep::{LockstepError, Member};
 use crate::client::request::{Commander, RequestError, random_client_id};
-use crate::client::torn::Torn;
 use crate::client::views::{Bends, Colliders, Forces, Parameters, Snapshot, Surface, Topology};
 use crate::client::watch::Watch;
 use crate::endpoint::Endpoint;
-use crate::messages::collider::{ColliderState, CollidersHeader};
-use crate::messages::outcome::Outcome;
-use crate::messages::parameters::to_values;
-use crate::messages::parameters::{ParameterState, ParametersHeader};
-use crate::messages::snapshot::{ParticleState, SnapshotHeader};
-use crate::messages::status::NodeStatus;
-use crate::messages::tears::{TearsHeader, TornConstraint};
-use crate::messages::topology::{BendState, ConstraintState, LoadHeader, Triangle};
 use crate::ports::latch::Latch;
 use crate::ports::reader::{ReadError, SliceReader, ValueReader};
 use crate::ports::service::{
     BENDS, COLLIDERS, PARAMETERS, PARTICLES, SCENE, STATUS, SURFACE, ServiceError, TEARS, TOPOLOGY,
 };
 use crate::ports::services::{AttachError, Attachment};
-use sim_types::{Action, CLIENT_ID_END};
 
 /// A program's connection to a simulation: reads snapshots, sends commands.
 ///
@@ -236,7 +231,7 @@ impl Client {
         self.watch.wait_for(&self.attachment, timeout, || {
             Ok(latch.newest(&self.attachment)?.map(|sample| Parameters {
                 header: *sample.user_header(),
-                values: to_values(sample.payload()),
+                values: ParameterState::to_values(sample.payload()),
             }))
         })
     }
@@ -388,6 +383,35 @@ impl Client {
         }
     }
 
+    /// Returns the remedy of a rejection in words, for an error message: that of [`Outcome::remedy`], or the allowed
+    /// indices of the loaded scene. Only the scene itself names its anchors.
+    ///
+    /// Without an answer of the owner within `timeout`, there are no indices.
+    pub fn remedy(&mut self, outcome: &Outcome, timeout: Duration) -> Option<String> {
+        let count = match outcome.reason()? {
+            Reason::UnknownParticle => self.load_header(timeout)?.particle_count as usize,
+            Reason::UnknownConstraint => self.load_header(timeout)?.count as usize,
+            Reason::UnknownCollider => {
+                let colliders = self.colliders(timeout).ok()?;
+                // Without an answer, the list is that of no run.
+                (colliders.header.run_id != 0).then_some(colliders.colliders.len())?
+            }
+            _ => return outcome.remedy(),
+        };
+        Some(allowed_indices(count))
+    }
+
+    /// Returns the header of the newest topology without a copy of the constraints.
+    fn load_header(&mut self, timeout: Duration) -> Option<LoadHeader> {
+        let Attachment { services, source, .. } = &self.attachment;
+        let create = || Latch::create(&services.topology, &TOPOLOGY, source);
+        let latch = get_or_create(&mut self.topology, create).ok()?;
+        let header = self.watch.wait_for(&self.attachment, timeout, || {
+            Ok(latch.newest(&self.attachment)?.map(|sample| *sample.user_header()))
+        });
+        header.ok()?
+    }
+
     /// Returns the next outcome of this client's commands, in the order of application. Outcomes that
     /// [`Client::request`] returned are left out. A client that has sent no command receives none.
     ///
@@ -529,13 +553,13 @@ fn get_or_create<T, E>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::messages::command::Command;
     use crate::owner::Owner;
     use crate::owner::load::Load;
     use crate::ports::service::OUTCOMES;
     use crate::ports::session::{Access, Session, Slices};
     use crate::ports::writer::{Capacity, SliceWriter, ValueWriter};
     use crate::testing::TestDomain;
+    use sim_messages::Command;
 
     const OWNED: u64 = 7;
     const FOREIGN: u64 = 8;

@@ -52,8 +52,6 @@ pub mod clock;
 mod domain;
 mod endpoint;
 mod files;
-mod limits;
-mod messages;
 mod owner;
 mod ports;
 mod process;
@@ -68,7 +66,6 @@ pub use client::request::{OwnerState, RequestError};
 pub use client::restoring::SentState;
 pub use client::state::State;
 pub use client::tap::Tap;
-pub use client::torn::Torn;
 pub use client::views::{Bends, Colliders, Forces, Parameters, Snapshot, Surface, Topology};
 pub use domain::Domain;
 pub use domain::config_file::{ConfigFile, ConfigFileError};
@@ -79,22 +76,6 @@ pub use files::part_file::error::{PartFileError, explain_write_error};
 pub use files::part_file::{Existing, PartFile, part_path};
 pub use files::place::is_being_written;
 pub use files::text_file::{TextFileError, read_scene_file, to_text};
-pub use limits::*;
-pub use messages::collider::{ColliderState, CollidersHeader};
-pub use messages::command::{CONSOLE_CLIENT_ID, Command};
-pub use messages::forces::{ForceKind, ForceRow, ForcesHeader};
-pub use messages::member_changes::{MemberChange, MemberChangeKind, MemberChanges};
-pub use messages::outcome::{
-    OUTCOME_FLAG_CONTROL, OUTCOME_FLAG_DISCONNECTED, OUTCOME_FLAG_NEW_RUN, Outcome, OutcomeStatus,
-};
-pub use messages::parameters::{ParameterState, ParametersHeader};
-pub use messages::ready::Ready;
-pub use messages::restore::{GivenState, MalformedState, ReceivedState, RestoreHeader, scene_hash};
-pub use messages::snapshot::{ParticleState, SnapshotFlags, SnapshotHeader};
-pub use messages::status::{MemberStatus, NodeStatus, StatusFlags};
-pub use messages::tears::{TearsHeader, TornConstraint};
-pub use messages::topology::{BendState, ConstraintState, KeyframeHeader, LoadHeader, Triangle};
-pub use messages::update::Update;
 pub use owner::Owner;
 pub use owner::error::OwnerError;
 pub use owner::load::Load;
@@ -113,12 +94,4 @@ pub use process::console;
 pub use process::file_size::report_file_size_limit;
 pub use process::stop::Stop;
 pub use scratch_domain::ScratchDomain;
-pub use sim_types::{
-    ACTIONS, Action, ActionInfo, Affects, BlockValue, CLIENT_ID_END, COLLIDERS_MAX, COORDINATE_MAX,
-    ColliderFields, ColliderShape, ConstraintKind, ELEMENTS_MAX, FieldForm, FieldInfo,
-    GRAB_OVER_S_DEFAULT, KindFilter, MOTION_POINTS_MAX, Method, MovedObject, NumberRange,
-    OVER_S_MAX, OffMeaning, PARAMETERS, Parameter, ParameterInfo, ParameterValue, ParameterValues,
-    Part, ParticleFlags, Parts, PathError, PathPart, PathPoint, PlainF32, PointFault, Reason,
-    RestoreContents, SCENE_SIZE_BYTES_MAX, SETTINGS_COUNT, STEP_WORK_MAX, Setting, Slider,
-    TearCause, Text, TextError, ValueForm, allowed_indices, json_hash, printable, printable_line,
-};
+pub use sim_messages::*;

@@ -16,18 +16,14 @@ use std::sync::Arc;
 use iceoryx2::port::notifier::NotifierCreateError;
 use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::prelude::{PortFactory, ipc_threadsafe};
+use sim_messages::{
+    COMMANDS_BUFFERED, CONTRACT_VERSION, ColliderState, CollidersHeader, Command, KeyframeHeader,
+    LoadHeader, MalformedState, NodeStatus, Outcome, ParameterValues, ParticleState,
+    READY_BUFFERED, RESTORES_MAX, Ready, ReceivedState, RestoreHeader, SnapshotHeader, TearsHeader,
+    TornConstraint,
+};
 
 use crate::endpoint::Endpoint;
-use crate::limits::{COMMANDS_BUFFERED, CONTRACT_VERSION, READY_BUFFERED, RESTORES_MAX};
-use crate::messages::collider::{ColliderState, CollidersHeader};
-use crate::messages::command::Command;
-use crate::messages::outcome::Outcome;
-use crate::messages::ready::Ready;
-use crate::messages::restore::{MalformedState, ReceivedState, RestoreHeader};
-use crate::messages::snapshot::{ParticleState, SnapshotHeader};
-use crate::messages::status::NodeStatus;
-use crate::messages::tears::{TearsHeader, TornConstraint};
-use crate::messages::topology::{KeyframeHeader, LoadHeader};
 use crate::owner::claim::{claim_name, take_lock};
 use crate::owner::error::OwnerError;
 use crate::owner::load::{Load, LoadWriters, check_limits, check_memory};
@@ -45,7 +41,6 @@ use crate::ports::session::{Access, Events, Session, Values};
 use crate::ports::wake::{Wake, WakeSender};
 use crate::ports::writer::PublishError;
 use crate::ports::writer::ValueWriter;
-use sim_types::ParameterValues;
 
 /// The process that owns a name: it publishes everything and receives the commands.
 ///
@@ -405,12 +400,10 @@ fn wake_sender(service: &Events) -> Result<WakeSender, ServiceError> {
 mod tests {
     use std::time::Duration;
 
-    use sim_types::Action;
+    use sim_messages::{Action, OWNER_PUBLISHERS_MAX, Triangle};
 
     use super::*;
     use crate::client::Client;
-    use crate::limits::OWNER_PUBLISHERS_MAX;
-    use crate::messages::topology::Triangle;
     use crate::ports::service::SURFACE;
     use crate::ports::session::Slices;
     use crate::ports::wake::{WakeCause, WakeListener};

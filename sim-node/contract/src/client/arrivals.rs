@@ -6,10 +6,9 @@
 
 use std::collections::VecDeque;
 
+use sim_messages::{ParticleState, SNAPSHOTS_BUFFERED, SnapshotHeader, Update};
+
 use crate::clock::SECOND_NS;
-use crate::limits::SNAPSHOTS_BUFFERED;
-use crate::messages::snapshot::{ParticleState, SnapshotHeader};
-use crate::messages::update::Update;
 
 /// Shortest wait of a snapshot: several rounds of a tunnel that looks for messages every 2 ms.
 const WAIT_MIN_NS: u64 = SECOND_NS / 20;
@@ -136,13 +135,9 @@ impl Seen {
 
 #[cfg(test)]
 mod tests {
-    use sim_types::Action;
+    use sim_messages::{Action, Command, KeyframeHeader, Outcome, TearsHeader};
 
     use super::*;
-    use crate::messages::command::Command;
-    use crate::messages::outcome::Outcome;
-    use crate::messages::tears::TearsHeader;
-    use crate::messages::topology::KeyframeHeader;
 
     const RUN_ID: u64 = 7;
 

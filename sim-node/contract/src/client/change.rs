@@ -2,16 +2,12 @@
 
 use std::collections::VecDeque;
 
-use sim_types::ParameterValues;
+use sim_messages::{
+    ColliderState, CollidersHeader, ForceRow, ForcesHeader, KeyframeHeader, Outcome,
+    ParameterValues, ParametersHeader, SnapshotHeader, TearsHeader, TornConstraint,
+};
 
 use crate::client::views::Parameters;
-use crate::messages::collider::{ColliderState, CollidersHeader};
-use crate::messages::forces::{ForceRow, ForcesHeader};
-use crate::messages::outcome::Outcome;
-use crate::messages::parameters::ParametersHeader;
-use crate::messages::snapshot::SnapshotHeader;
-use crate::messages::tears::{TearsHeader, TornConstraint};
-use crate::messages::topology::KeyframeHeader;
 
 /// A change between two states.
 #[derive(Debug, Clone, PartialEq)]

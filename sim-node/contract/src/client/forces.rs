@@ -1,8 +1,8 @@
 //! The forces that a client reads: the newest ones, or those of a snapshot.
 
+use sim_messages::{ForceRow, ForcesHeader, SnapshotHeader};
+
 use crate::client::views::Forces;
-use crate::messages::forces::{ForceRow, ForcesHeader};
-use crate::messages::snapshot::SnapshotHeader;
 use crate::ports::reader::{ReadError, SliceReader, SliceSample};
 use crate::ports::service::{FORCES, ServiceError};
 use crate::ports::services::Attachment;

@@ -2,8 +2,7 @@
 
 use std::collections::VecDeque;
 
-use crate::messages::snapshot::SnapshotHeader;
-use crate::messages::topology::{BendState, ConstraintState, LoadHeader, Triangle};
+use sim_messages::{BendState, ConstraintState, LoadHeader, SnapshotHeader, Triangle};
 
 /// A scene with everything that stays the same until the next load.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -3,13 +3,12 @@
 use std::num::NonZeroU32;
 use std::time::Duration;
 
+use sim_messages::{
+    MemberChange, MemberChangeKind, NodeStatus, Ready, SnapshotFlags, SnapshotHeader,
+};
 use thiserror::Error;
 
 use crate::client::request::OwnerState;
-use crate::messages::member_changes::{MemberChange, MemberChangeKind};
-use crate::messages::ready::Ready;
-use crate::messages::snapshot::{SnapshotFlags, SnapshotHeader};
-use crate::messages::status::NodeStatus;
 use crate::ports::reader::ReadError;
 use crate::ports::service::{READY, ServiceError};
 use crate::ports::services::{AttachError, Attachment};

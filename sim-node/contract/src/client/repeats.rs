@@ -1,14 +1,9 @@
 //! Recognition of messages that an owner has published again, for a reader behind a network tunnel.
 
-use sim_types::ParameterValues;
-
-use crate::messages::collider::CollidersHeader;
-use crate::messages::forces::ForcesHeader;
-use crate::messages::parameters::ParametersHeader;
-use crate::messages::snapshot::SnapshotHeader;
-use crate::messages::tears::TearsHeader;
-use crate::messages::topology::{KeyframeHeader, LoadHeader};
-use crate::messages::update::Update;
+use sim_messages::{
+    CollidersHeader, ForcesHeader, KeyframeHeader, LoadHeader, ParameterValues, ParametersHeader,
+    SnapshotHeader, TearsHeader, Update,
+};
 
 /// The last message of each latched service.
 #[derive(Debug, Default)]

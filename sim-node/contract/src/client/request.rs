@@ -1,26 +1,23 @@
 //! Sending of commands and matching of their outcomes.
 
-mod remedy;
-
 use std::collections::VecDeque;
 use std::fmt;
 use std::time::Duration;
 
 use bytemuck::bytes_of;
+use sim_messages::{
+    Action, COMMANDS_BUFFERED, COMMANDS_PER_STEP_MAX, CONSOLE_CLIENT_ID, Command, GivenState,
+    OUTCOME_FLAG_CONTROL, OUTCOMES_BUFFERED, Outcome, RestoreHeader,
+};
 use thiserror::Error;
 
 use crate::clock::epoch_microseconds;
 use crate::endpoint::Endpoint;
-use crate::limits::{COMMANDS_BUFFERED, COMMANDS_PER_STEP_MAX, OUTCOMES_BUFFERED};
-use crate::messages::command::{CONSOLE_CLIENT_ID, Command};
-use crate::messages::outcome::{OUTCOME_FLAG_CONTROL, Outcome};
-use crate::messages::restore::{GivenState, RestoreHeader};
 use crate::ports::port::reader_count;
 use crate::ports::reader::{Drained, ReadError, ValueReader};
 use crate::ports::service::{COMMANDS, OUTCOMES, ServiceError};
 use crate::ports::services::{AttachError, Attachment, OwnerProcess};
 use crate::ports::writer::{Capacity, PublishError, SliceWriter, ValueWriter};
-use sim_types::Action;
 
 /// Error of a request: the command has no outcome.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]

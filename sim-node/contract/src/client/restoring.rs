@@ -2,10 +2,10 @@
 
 use std::time::Duration;
 
+use sim_messages::{GivenState, Outcome};
+
 use crate::client::request::{RequestError, StateWriter};
 use crate::client::{Client, open_commander};
-use crate::messages::outcome::Outcome;
-use crate::messages::restore::GivenState;
 
 /// A state that was sent to the node. It must live until its outcome arrives: the message vanishes with it.
 #[derive(Debug)]

@@ -1,13 +1,12 @@
 //! Coherent states, assembled from the messages of all services.
 
+use sim_messages::{
+    OUTCOME_FLAG_CONTROL, ParticleState, SnapshotHeader, TearsHeader, Torn, Update,
+};
+
 use crate::client::change::{Change, LostChanges, PendingChanges};
 use crate::client::loaded_scene::{LoadedScene, PendingLoads};
-use crate::client::torn::Torn;
 use crate::client::views::{Colliders, Parameters};
-use crate::messages::outcome::OUTCOME_FLAG_CONTROL;
-use crate::messages::snapshot::{ParticleState, SnapshotHeader};
-use crate::messages::tears::TearsHeader;
-use crate::messages::update::Update;
 
 /// A published state with everything that belongs to it, at the end of its step.
 #[derive(Debug, Clone, Copy)]
@@ -195,14 +194,12 @@ impl StateAssembler {
 
 #[cfg(test)]
 mod tests {
-    use sim_types::{Action, Parameter, ParameterValues, TearCause};
+    use sim_messages::{
+        Action, Command, LoadHeader, Outcome, Parameter, ParameterValues, ParametersHeader,
+        TearCause, TornConstraint,
+    };
 
     use super::*;
-    use crate::messages::command::Command;
-    use crate::messages::outcome::Outcome;
-    use crate::messages::parameters::ParametersHeader;
-    use crate::messages::tears::TornConstraint;
-    use crate::messages::topology::LoadHeader;
 
     const RUN_ID: u64 = 7;
 

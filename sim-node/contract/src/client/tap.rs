@@ -4,6 +4,13 @@ use std::num::NonZeroU32;
 use std::sync::Arc;
 use std::time::Duration;
 
+use sim_messages::{
+    BendState, COMMANDS_PER_STEP_MAX, ColliderState, CollidersHeader, ConstraintState, ForceRow,
+    ForcesHeader, KeyframeHeader, LoadHeader, NodeStatus, OUTCOMES_BUFFERED, Outcome,
+    ParameterState, ParametersHeader, ParticleState, SnapshotHeader, TearsHeader, TornConstraint,
+    Triangle, UPDATES_BUFFERED, Update,
+};
+
 use crate::client::arrivals::{Arrivals, Copied};
 use crate::client::change::LostChanges;
 use crate::client::lockstep::{LockstepError, Member};
@@ -13,17 +20,6 @@ use crate::client::state::{State, StateAssembler};
 use crate::client::watch::listen;
 use crate::clock::monotonic_ns;
 use crate::endpoint::Endpoint;
-use crate::limits::{COMMANDS_PER_STEP_MAX, OUTCOMES_BUFFERED, UPDATES_BUFFERED};
-use crate::messages::collider::{ColliderState, CollidersHeader};
-use crate::messages::forces::{ForceRow, ForcesHeader};
-use crate::messages::outcome::Outcome;
-use crate::messages::parameters::to_values;
-use crate::messages::parameters::{ParameterState, ParametersHeader};
-use crate::messages::snapshot::{ParticleState, SnapshotHeader};
-use crate::messages::status::NodeStatus;
-use crate::messages::tears::{TearsHeader, TornConstraint};
-use crate::messages::topology::{BendState, ConstraintState, KeyframeHeader, LoadHeader, Triangle};
-use crate::messages::update::Update;
 use crate::ports::reader::{Drained, ReadError, SliceReader, SliceSample, ValueReader};
 use crate::ports::service::{
     BENDS, COLLIDERS, FORCES, KEYFRAME, OUTCOMES, PARAMETERS, PARTICLES, SCENE, STATUS, SURFACE,
@@ -344,7 +340,7 @@ impl Tap {
         self.colliders.drain(result, |header, items| sink(Update::Colliders(header, items)));
         self.tears.drain(result, |header, items| sink(Update::Tears(header, items)));
         self.parameters.drain(result, |header, states| {
-            sink(Update::Parameters(header, &to_values(states)));
+            sink(Update::Parameters(header, &ParameterState::to_values(states)));
         });
         if let Some(forces) = &self.forces {
             forces.drain(result, |header, rows| sink(Update::Forces(header, rows)));

@@ -1,12 +1,11 @@
 //! The data that a client reads.
 
-use crate::messages::collider::{ColliderState, CollidersHeader};
-use crate::messages::forces::{ForceKind, ForceRow, ForcesHeader};
-use crate::messages::parameters::ParametersHeader;
-use crate::messages::snapshot::{ParticleState, SnapshotHeader};
-use crate::messages::topology::{BendState, ConstraintState, LoadHeader, Triangle};
+use sim_messages::{
+    BendState, ColliderState, CollidersHeader, ConstraintState, ForceKind, ForceRow, ForcesHeader,
+    LoadHeader, ParameterValues, ParametersHeader, ParticleState, SnapshotHeader, Triangle,
+};
+
 use crate::ports::reader::SliceSample;
-use sim_types::ParameterValues;
 
 /// A snapshot in shared memory: holding it keeps the memory from being reused.
 #[derive(Debug)]

@@ -5,12 +5,11 @@ use std::thread;
 use std::time::Duration;
 
 use iceoryx2::prelude::{CallbackProgression, Config};
+use sim_messages::{CONSOLE_CLIENT_ID, NodeStatus};
 
 use crate::client::Client;
 use crate::clock::{self, Deadline};
 use crate::endpoint::Endpoint;
-use crate::messages::command::CONSOLE_CLIENT_ID;
-use crate::messages::status::NodeStatus;
 use crate::ports::domain::owner_lock::OwnerLock;
 use crate::ports::domain::{lock_list, root, unfinished};
 use crate::ports::service::{STATUS, ServiceError};
@@ -133,12 +132,11 @@ fn try_to_ask(config: &Config, endpoint: &Endpoint, timeout: Duration) -> Option
 mod tests {
     use super::*;
     use crate::domain::Domain;
-    use crate::limits::CONTRACT_VERSION;
-    use crate::messages::topology::LoadHeader;
     use crate::owner::Owner;
     use crate::owner::load::Load;
     use crate::ports::domain;
     use crate::testing::TestDomain;
+    use sim_messages::{CONTRACT_VERSION, LoadHeader};
 
     const LOAD: Load<'_> = Load {
         header: LoadHeader {
@@ -159,7 +157,7 @@ mod tests {
         triangles: &[],
         collider_count: 0,
         keyframe_size_bytes_max: 0,
-        parameters: sim_types::ParameterValues::DEFAULT,
+        parameters: sim_messages::ParameterValues::DEFAULT,
     };
 
     fn endpoint(domain: &TestDomain, name: &str) -> Endpoint {

@@ -8,7 +8,7 @@ use std::path::Path;
 use rustix::fs::OFlags;
 use thiserror::Error;
 
-use sim_types::SCENE_SIZE_BYTES_MAX;
+use sim_messages::SCENE_SIZE_BYTES_MAX;
 
 use crate::files::kind::kind_of_non_file;
 use crate::files::mesh_format::other_format;

@@ -2,9 +2,10 @@
 
 use std::time::Duration;
 
+use sim_messages::NodeStatus;
+
 use crate::clock::{self, Deadline};
 use crate::endpoint::Endpoint;
-use crate::messages::status::NodeStatus;
 use crate::owner::error::OwnerError;
 use crate::ports::domain::owner_lock::{LockError, OwnerLock};
 use crate::ports::domain::root::RootError;

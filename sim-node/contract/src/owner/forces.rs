@@ -1,6 +1,7 @@
 //! Publishing of forces: only while a client reads them.
 
-use crate::messages::forces::{ForceRow, ForcesHeader};
+use sim_messages::{ForceRow, ForcesHeader};
+
 use crate::owner::Owner;
 use crate::owner::error::OwnerError;
 use crate::ports::connection;

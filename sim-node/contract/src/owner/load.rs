@@ -4,13 +4,13 @@ use std::cell::RefCell;
 use std::collections::BTreeSet;
 use std::fs::File;
 
-use crate::messages::collider::{ColliderState, CollidersHeader};
-use crate::messages::forces::{ForceRow, ForcesHeader};
-use crate::messages::parameters::{ParameterState, ParametersHeader};
-use crate::messages::restore::scene_hash;
-use crate::messages::snapshot::{ParticleState, SnapshotHeader};
-use crate::messages::tears::{TearsHeader, TornConstraint};
-use crate::messages::topology::{BendState, ConstraintState, KeyframeHeader, LoadHeader, Triangle};
+use sim_messages::{
+    BendState, COLLIDERS_MAX, ColliderState, CollidersHeader, ConstraintState, ELEMENTS_MAX,
+    ForceRow, ForcesHeader, KeyframeHeader, LoadHeader, ParameterState, ParameterValues,
+    ParametersHeader, ParticleState, SCENE_SIZE_BYTES_MAX, SETTINGS_COUNT, SnapshotHeader,
+    TearsHeader, TornConstraint, Triangle, scene_hash,
+};
+
 use crate::owner::error::OwnerError;
 use crate::ports::memory;
 use crate::ports::service::{
@@ -19,9 +19,6 @@ use crate::ports::service::{
 use crate::ports::services::Services;
 use crate::ports::writer::PublishError;
 use crate::ports::writer::{Capacity, SliceWriter};
-use sim_types::{
-    COLLIDERS_MAX, ELEMENTS_MAX, ParameterValues, SCENE_SIZE_BYTES_MAX, SETTINGS_COUNT,
-};
 
 /// A load: the data that an owner publishes once, and the sizes of its later messages.
 #[derive(Debug, Clone, Default)]

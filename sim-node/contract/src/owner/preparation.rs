@@ -104,10 +104,9 @@ mod tests {
     use std::path::PathBuf;
     use std::thread;
 
-    use sim_types::ParameterValues;
+    use sim_messages::{LoadHeader, ParameterValues};
 
     use super::*;
-    use crate::messages::topology::LoadHeader;
     use crate::owner::Owner;
     use crate::ports::domain;
     use crate::ports::domain::files::segments;

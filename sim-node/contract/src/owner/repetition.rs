@@ -141,12 +141,11 @@ where
 
 #[cfg(test)]
 mod tests {
-    use sim_types::ParameterValues;
+    use sim_messages::{
+        BendState, ConstraintState, LoadHeader, ParameterValues, Ready, SnapshotHeader, Triangle,
+    };
 
     use crate::client::tap::Tap;
-    use crate::messages::ready::Ready;
-    use crate::messages::snapshot::SnapshotHeader;
-    use crate::messages::topology::{BendState, ConstraintState, LoadHeader, Triangle};
     use crate::owner::Owner;
     use crate::owner::load::Load;
     use crate::ports::reader::SliceReader;

@@ -8,9 +8,8 @@ use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::prelude::{
     CallbackProgression, NodeState, PortFactory, ZeroCopySend, ipc_threadsafe,
 };
+use sim_messages::{BORROWED_UPDATES_MAX, Command};
 
-use crate::limits::BORROWED_UPDATES_MAX;
-use crate::messages::command::Command;
 use crate::ports::port::SliceHeader;
 use crate::ports::session::{Slices, Values};
 

@@ -14,11 +14,11 @@ use std::path::PathBuf;
 use std::sync::Once;
 use std::time::Duration;
 
-use crate::limits::{MIRROR_BORROWED_MIN, MIRROR_BUFFERED_MIN, MIRROR_PORTS_MAX, PARTICIPANTS_MAX};
 use iceoryx2::prelude::{
     Config, FileName, LogLevel, Path, SemanticString, SemanticStringError,
     set_log_level_from_env_or,
 };
+use sim_messages::{MIRROR_BORROWED_MIN, MIRROR_BUFFERED_MIN, MIRROR_PORTS_MAX, PARTICIPANTS_MAX};
 
 /// Longest directory and prefix together, in bytes. A listener binds the Unix socket
 /// `<directory>/<prefix><id>.event`. Its path has at most 107 bytes, up to 39 of them for the id.

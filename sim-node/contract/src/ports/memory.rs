@@ -90,12 +90,12 @@ mod tests {
     use std::os::unix::fs::MetadataExt;
 
     use crate::client::Client;
-    use crate::messages::topology::{ConstraintState, LoadHeader};
     use crate::owner::Owner;
     use crate::owner::load::Load;
     use crate::ports::domain;
     use crate::ports::domain::files::segments;
     use crate::testing::TestDomain;
+    use sim_messages::{ConstraintState, LoadHeader};
 
     #[test]
     fn no_message_of_an_owner_or_client_needs_another_page() {
@@ -109,13 +109,13 @@ mod tests {
             triangles: &[],
             collider_count: 2,
             keyframe_size_bytes_max: 20_000,
-            parameters: sim_types::ParameterValues::DEFAULT,
+            parameters: sim_messages::ParameterValues::DEFAULT,
         };
         let mut owner = Owner::create(&domain.endpoint(), &load(1000)).unwrap();
         owner.load(&load(2000)).unwrap();
         let mut client = Client::attach(&domain.endpoint()).unwrap();
         // Creates the writer of commands.
-        client.send(sim_types::Action::Pause).unwrap();
+        client.send(sim_messages::Action::Pause).unwrap();
         let config = domain::configuration(Some(domain.name())).unwrap();
         let mut segment_count = 0;
         for path in segments(&config, &config.global.service.data_segment_suffix) {

@@ -8,12 +8,12 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use iceoryx2::prelude::PortFactory;
+use sim_messages::{
+    FAR_SILENCE_MAX_MS, MIRROR_BORROWED_MIN, MIRROR_BUFFERED_MIN, NodeStatus, ParticleState, Ready,
+    SnapshotHeader,
+};
 
 use crate::clock::{Deadline, SECOND_NS, monotonic_ns};
-use crate::limits::{FAR_SILENCE_MAX_MS, MIRROR_BORROWED_MIN, MIRROR_BUFFERED_MIN};
-use crate::messages::ready::Ready;
-use crate::messages::snapshot::{ParticleState, SnapshotHeader};
-use crate::messages::status::NodeStatus;
 use crate::ports::reader::ValueReader;
 use crate::ports::service::{PARTICLES, READY, STATUS, ServiceError};
 use crate::ports::session::{Session, Slices, Values};
@@ -118,11 +118,11 @@ mod tests {
 
     use super::*;
     use crate::client::Client;
-    use crate::limits::CONTRACT_VERSION;
     use crate::ports::service::ServiceSpec;
     use crate::ports::services::{AttachError, Services};
     use crate::ports::session::Access;
     use crate::testing::TestDomain;
+    use sim_messages::CONTRACT_VERSION;
 
     /// Services as a tunnel creates them, with the status of a node of a contract version.
     struct Tunnel {

@@ -4,14 +4,11 @@ use std::fmt::Debug;
 
 use iceoryx2::prelude::{IceoryxSend, PortFactory, ZeroCopySend, ipc_threadsafe};
 use iceoryx2::service::port_factory::publish_subscribe;
+use sim_messages::{
+    CollidersHeader, ForcesHeader, KeyframeHeader, LoadHeader, ParametersHeader, RestoreHeader,
+    SnapshotHeader, TearsHeader,
+};
 
-use crate::messages::collider::CollidersHeader;
-use crate::messages::forces::ForcesHeader;
-use crate::messages::parameters::ParametersHeader;
-use crate::messages::restore::RestoreHeader;
-use crate::messages::snapshot::SnapshotHeader;
-use crate::messages::tears::TearsHeader;
-use crate::messages::topology::{KeyframeHeader, LoadHeader};
 use crate::ports::cleanup;
 use crate::ports::memory;
 use crate::ports::service::ServiceError;

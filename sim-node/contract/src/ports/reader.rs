@@ -9,9 +9,9 @@ use iceoryx2::prelude::{IceoryxSend, PortFactory, ZeroCopySend, ipc_threadsafe};
 use iceoryx2::sample::Sample;
 use iceoryx2::service::header::payload_header::PayloadHeader;
 use iceoryx2::service::port_factory::publish_subscribe;
+use sim_messages::BORROWED_UPDATES_MAX;
 use thiserror::Error;
 
-use crate::limits::BORROWED_UPDATES_MAX;
 use crate::ports::port::{PortLimit, SliceHeader, create_port};
 use crate::ports::service::{ServiceError, ServiceSpec};
 use crate::ports::session::{Slices, Values};
@@ -259,10 +259,10 @@ fn read_error(service: &str, max: usize, error: ReceiveError) -> ReadError {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::messages::tears::{TearsHeader, TornConstraint};
     use crate::ports::service::TEARS;
     use crate::ports::session::{Access, Session};
     use crate::testing::TestDomain;
+    use sim_messages::{TearsHeader, TornConstraint};
 
     #[test]
     fn a_message_with_a_wrong_length_in_its_header_is_dropped_and_the_next_one_is_read() {

@@ -5,15 +5,15 @@ use iceoryx2::service::builder::event::{EventCreateError, EventOpenError, EventO
 use iceoryx2::service::builder::publish_subscribe::{
     PublishSubscribeCreateError, PublishSubscribeOpenError, PublishSubscribeOpenOrCreateError,
 };
-use thiserror::Error;
-
-use crate::endpoint::Endpoint;
-use crate::limits::{
+use sim_messages::{
     BORROWED_SAMPLES_MAX, BORROWED_UPDATES_MAX, CLIENTS_MAX, COMMAND_READERS_MAX,
     COMMANDS_BUFFERED, KEYFRAMES_BUFFERED, LISTENERS_MAX, MEMBERS_MAX, OUTCOME_READERS_MAX,
     OUTCOMES_BUFFERED, OWNER_PUBLISHERS_MAX, READERS_MAX, READY_BUFFERED, RESTORES_MAX,
     SNAPSHOTS_BUFFERED, STATUS_PUBLISHERS_MAX, UPDATES_BUFFERED,
 };
+use thiserror::Error;
+
+use crate::endpoint::Endpoint;
 use crate::ports::domain::root::RootError;
 use crate::ports::memory::MemoryError;
 

@@ -5,21 +5,15 @@ use std::sync::Arc;
 use iceoryx2::identifiers::UniqueNodeId;
 use iceoryx2::node::NodeView;
 use iceoryx2::prelude::{CallbackProgression, Config, NodeState, PortFactory};
-use sim_types::CLIENT_ID_END;
+use sim_messages::{
+    BendState, CLIENT_ID_END, ColliderState, CollidersHeader, Command, ConstraintState, ForceRow,
+    ForcesHeader, KeyframeHeader, LoadHeader, NodeStatus, Outcome, ParameterState,
+    ParametersHeader, ParticleState, Ready, RestoreHeader, SnapshotHeader, TearsHeader,
+    TornConstraint, Triangle,
+};
 use thiserror::Error;
 
 use crate::endpoint::Endpoint;
-use crate::messages::collider::{ColliderState, CollidersHeader};
-use crate::messages::command::Command;
-use crate::messages::forces::{ForceRow, ForcesHeader};
-use crate::messages::outcome::Outcome;
-use crate::messages::parameters::{ParameterState, ParametersHeader};
-use crate::messages::ready::Ready;
-use crate::messages::restore::RestoreHeader;
-use crate::messages::snapshot::{ParticleState, SnapshotHeader};
-use crate::messages::status::NodeStatus;
-use crate::messages::tears::{TearsHeader, TornConstraint};
-use crate::messages::topology::{BendState, ConstraintState, KeyframeHeader, LoadHeader, Triangle};
 use crate::ports::domain::orphans::{self, Port};
 use crate::ports::domain::owner_lock::OwnerLock;
 use crate::ports::mirror::Mirror;
@@ -320,9 +314,8 @@ fn no_node(config: &Config, endpoint: &Endpoint, missing: String) -> AttachError
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sim_types::ParameterValues;
+    use sim_messages::{CONTRACT_VERSION, ParameterValues};
 
-    use crate::limits::CONTRACT_VERSION;
     use crate::owner::Owner;
     use crate::owner::error::OwnerError;
     use crate::owner::load::Load;

@@ -11,9 +11,9 @@ use iceoryx2::prelude::{
 };
 use iceoryx2::service::builder::publish_subscribe::Builder;
 use iceoryx2::service::port_factory;
+use sim_messages::{CONTRACT_VERSION, PARTICIPANTS_MAX};
 
 use crate::endpoint::Endpoint;
-use crate::limits::{CONTRACT_VERSION, PARTICIPANTS_MAX};
 use crate::ports::cleanup;
 use crate::ports::domain::orphans::{self, Port};
 use crate::ports::domain::owner_lock::{LockPlace, OwnerLock};

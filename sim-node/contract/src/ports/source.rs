@@ -5,8 +5,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use iceoryx2::identifiers::UniqueNodeId;
 use iceoryx2::prelude::{CallbackProgression, PortFactory, ipc_threadsafe};
+use sim_messages::NodeStatus;
 
-use crate::messages::status::NodeStatus;
 use crate::ports::domain::owner_lock::LockPlace;
 use crate::ports::service::OWNER_PORT;
 use crate::ports::session::{Values, version_of};

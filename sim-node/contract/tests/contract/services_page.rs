@@ -23,23 +23,12 @@ use sim_contract::{
 use crate::layout::layouts;
 use crate::support::create_owner;
 
-/// The sources of the messages, for the types and the meanings of the fields.
-const SOURCES: [&str; 11] = [
-    include_str!("../../src/messages/snapshot.rs"),
-    include_str!("../../src/messages/topology.rs"),
-    include_str!("../../src/messages/tears.rs"),
-    include_str!("../../src/messages/parameters.rs"),
-    include_str!("../../src/messages/collider.rs"),
-    include_str!("../../src/messages/forces.rs"),
-    include_str!("../../src/messages/command.rs"),
-    include_str!("../../src/messages/outcome.rs"),
-    include_str!("../../src/messages/status.rs"),
-    include_str!("../../src/messages/member_changes.rs"),
-    concat!(
-        include_str!("../../src/messages/ready.rs"),
-        include_str!("../../src/messages/restore.rs")
-    ),
-];
+/// Returns the sources of the messages, for the types and the meanings of the fields.
+fn sources() -> Vec<String> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../messages/src");
+    let files = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    files.map(|file| std::fs::read_to_string(file).unwrap()).collect()
+}
 
 #[test]
 fn the_tables_of_the_services_page_are_those_of_the_types() {
@@ -202,7 +191,8 @@ fn plain(text: &str) -> String {
 
 /// A table for each type, from the layout that the compiler gives it.
 fn layout_tables() -> String {
-    let fields: BTreeMap<_, _> = SOURCES.into_iter().flat_map(fields).collect();
+    let sources = sources();
+    let fields: BTreeMap<_, _> = sources.iter().flat_map(|text| fields(text)).collect();
     let mut text = String::new();
     let layouts = layouts();
     let mut lines = layouts.lines().peekable();

@@ -1,13 +1,14 @@
 //! The messages of the service `restore`: states that clients give to the node.
 
 use bytemuck::{Pod, Zeroable};
-use iceoryx2::prelude::ZeroCopySend;
+use iceoryx2_bb_derive_macros::ZeroCopySend;
+use iceoryx2_bb_elementary_traits::zero_copy_send::ZeroCopySend;
 use sim_types::RestoreContents;
 use thiserror::Error;
 use xxhash_rust::xxh3::xxh3_64;
 
-use crate::messages::command::Command;
-use crate::messages::snapshot::ParticleState;
+use crate::command::Command;
+use crate::snapshot::ParticleState;
 use sim_types::Action;
 
 /// Header of `restore`: 40 bytes, alignment 8. The payload has `particle_count` [`ParticleState`]s, and
@@ -52,7 +53,8 @@ pub struct GivenState<'a> {
 }
 
 impl GivenState<'_> {
-    pub(crate) fn header(&self, client_id: u64, sequence: u64) -> RestoreHeader {
+    /// Returns the header of the message `sequence` of the client `client_id`.
+    pub fn header(&self, client_id: u64, sequence: u64) -> RestoreHeader {
         let keyframe_size_bytes = self.keyframe.map_or(0, <[u8]>::len);
         RestoreHeader {
             client_id,
@@ -65,7 +67,7 @@ impl GivenState<'_> {
     }
 
     /// Returns a byte of the payload.
-    pub(crate) fn byte(&self, index: usize) -> u8 {
+    pub fn byte(&self, index: usize) -> u8 {
         let particles: &[u8] = bytemuck::cast_slice(self.particles);
         match (particles.get(index), self.keyframe) {
             (Some(byte), _) => *byte,
@@ -73,7 +75,8 @@ impl GivenState<'_> {
         }
     }
 
-    pub(crate) fn contents(&self) -> RestoreContents {
+    /// Returns the contents of the message: a complete state, or positions and velocities.
+    pub fn contents(&self) -> RestoreContents {
         match self.keyframe {
             Some(_) => RestoreContents::State,
             None => RestoreContents::Motion,
@@ -136,8 +139,11 @@ pub struct ReceivedState {
 }
 
 impl ReceivedState {
-    /// Copies a message. One that cannot be read, or is longer than `size_bytes_max`, is not copied.
-    pub(crate) fn from_message(
+    /// Copies a message.
+    ///
+    /// # Errors
+    /// The message contradicts itself, or is longer than `size_bytes_max`. It is not copied.
+    pub fn from_message(
         header: &RestoreHeader,
         payload: &[u8],
         size_bytes_max: usize,
@@ -170,7 +176,7 @@ impl ReceivedState {
 
 impl RestoreHeader {
     /// Returns the command that the outcome answers. Unknown contents count as a state.
-    pub(crate) fn command(&self) -> Command {
+    pub fn command(&self) -> Command {
         let contents = RestoreContents::from_number(self.contents);
         let contents = contents.unwrap_or(RestoreContents::State);
         let action = Action::Restore { contents, state_hash: 0 };

@@ -1,7 +1,8 @@
 //! The messages of the service `parameters`.
 
 use bytemuck::{Pod, Zeroable};
-use iceoryx2::prelude::ZeroCopySend;
+use iceoryx2_bb_derive_macros::ZeroCopySend;
+use iceoryx2_bb_elementary_traits::zero_copy_send::ZeroCopySend;
 use sim_types::{ConstraintKind, Parameter, ParameterValue, ParameterValues, Part, Parts, Setting};
 
 /// Header of `parameters`: 24 bytes, alignment 8. The payload holds the values of all parameters.
@@ -78,11 +79,11 @@ impl ParameterState {
         };
         Some(Setting { parameter, part, value })
     }
-}
 
-/// Collects the values of a message. Parameters that the message lacks have their defaults.
-pub(crate) fn to_values(states: &[ParameterState]) -> ParameterValues {
-    states.iter().filter_map(ParameterState::setting).collect()
+    /// Collects the values of a message. Parameters that the message lacks have their defaults.
+    pub fn to_values(states: &[Self]) -> ParameterValues {
+        states.iter().filter_map(Self::setting).collect()
+    }
 }
 
 #[cfg(test)]
@@ -106,7 +107,7 @@ mod tests {
         }
         let settings = values.settings();
         let states: Vec<_> = settings.into_iter().map(ParameterState::from).collect();
-        assert_eq!(to_values(&states), values);
+        assert_eq!(ParameterState::to_values(&states), values);
     }
 
     #[test]
@@ -124,7 +125,7 @@ mod tests {
             ParameterState { parameter: Parameter::Stiffness as u32, constraint_kind: 4, ..valid },
         ] {
             assert_eq!(unknown.setting(), None);
-            assert_eq!(to_values(&[unknown]), ParameterValues::default());
+            assert_eq!(ParameterState::to_values(&[unknown]), ParameterValues::default());
         }
     }
 }

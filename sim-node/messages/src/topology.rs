@@ -1,7 +1,8 @@
 //! The messages of the services `topology`, `bends`, `surface`, `scene` and `keyframe`.
 
 use bytemuck::{Pod, Zeroable};
-use iceoryx2::prelude::ZeroCopySend;
+use iceoryx2_bb_derive_macros::ZeroCopySend;
+use iceoryx2_bb_elementary_traits::zero_copy_send::ZeroCopySend;
 
 /// A constraint: 20 bytes, alignment 4. Its position in `topology` is its index everywhere. It does
 /// not change until the next load; the service `tears` lists the torn constraints.

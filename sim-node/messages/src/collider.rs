@@ -1,7 +1,8 @@
 //! The messages of the service `colliders`.
 
 use bytemuck::{Pod, Zeroable};
-use iceoryx2::prelude::ZeroCopySend;
+use iceoryx2_bb_derive_macros::ZeroCopySend;
+use iceoryx2_bb_elementary_traits::zero_copy_send::ZeroCopySend;
 use sim_types::ColliderFields;
 
 /// A collider in its pose at the end of a step: 120 bytes, alignment 4. Its position in `colliders`

@@ -1,7 +1,8 @@
 //! The messages of the service `particles`.
 
 use bytemuck::{Pod, Zeroable};
-use iceoryx2::prelude::ZeroCopySend;
+use iceoryx2_bb_derive_macros::ZeroCopySend;
+use iceoryx2_bb_elementary_traits::zero_copy_send::ZeroCopySend;
 
 /// State of a particle after a step: 32 bytes, alignment 4; an element of `particles`. The position
 /// in the payload is the particle's index everywhere.

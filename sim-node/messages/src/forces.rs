@@ -1,7 +1,8 @@
 //! The messages of the service `forces`.
 
 use bytemuck::{Pod, Zeroable};
-use iceoryx2::prelude::ZeroCopySend;
+use iceoryx2_bb_derive_macros::ZeroCopySend;
+use iceoryx2_bb_elementary_traits::zero_copy_send::ZeroCopySend;
 
 /// Header of `forces`: 24 bytes, alignment 8. The payload has a row for each collider, then for each anchor,
 /// then for each pinned, grabbed or anchored particle, each by index.

@@ -2,13 +2,13 @@
 
 use sim_types::ParameterValues;
 
-use crate::messages::collider::{ColliderState, CollidersHeader};
-use crate::messages::forces::{ForceRow, ForcesHeader};
-use crate::messages::outcome::Outcome;
-use crate::messages::parameters::ParametersHeader;
-use crate::messages::status::NodeStatus;
-use crate::messages::tears::{TearsHeader, TornConstraint};
-use crate::messages::topology::{BendState, ConstraintState, KeyframeHeader, LoadHeader, Triangle};
+use crate::collider::{ColliderState, CollidersHeader};
+use crate::command::Outcome;
+use crate::forces::{ForceRow, ForcesHeader};
+use crate::parameters::ParametersHeader;
+use crate::status::NodeStatus;
+use crate::tears::{TearsHeader, TornConstraint};
+use crate::topology::{BendState, ConstraintState, KeyframeHeader, LoadHeader, Triangle};
 
 /// A message of any service except `particles`, in shared memory.
 #[derive(Debug, Clone, Copy)]

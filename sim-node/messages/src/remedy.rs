@@ -1,14 +1,8 @@
 //! Remedies of rejected commands, for error messages.
 
-use std::time::Duration;
+use sim_types::{Action, Reason};
 
-use crate::client::{Client, get_or_create};
-use crate::messages::outcome::Outcome;
-use crate::messages::topology::LoadHeader;
-use crate::ports::latch::Latch;
-use crate::ports::service::TOPOLOGY;
-use crate::ports::services::Attachment;
-use sim_types::{Action, Reason, allowed_indices};
+use crate::command::Outcome;
 
 impl Outcome {
     /// Returns the remedy of a rejection in words, as far as it follows from the outcome alone: the allowed
@@ -25,37 +19,6 @@ impl Outcome {
             Reason::NoEffectHere => missing_condition(&action).map(str::to_owned),
             _ => action.allowed_values(reason).map(|values| format!("allowed: {values}")),
         }
-    }
-}
-
-impl Client {
-    /// Returns the remedy of a rejection in words, for an error message: that of [`Outcome::remedy`], or the allowed
-    /// indices of the loaded scene. Only the scene itself names its anchors.
-    ///
-    /// Without an answer of the owner within `timeout`, there are no indices.
-    pub fn remedy(&mut self, outcome: &Outcome, timeout: Duration) -> Option<String> {
-        let count = match outcome.reason()? {
-            Reason::UnknownParticle => self.load_header(timeout)?.particle_count as usize,
-            Reason::UnknownConstraint => self.load_header(timeout)?.count as usize,
-            Reason::UnknownCollider => {
-                let colliders = self.colliders(timeout).ok()?;
-                // Without an answer, the list is that of no run.
-                (colliders.header.run_id != 0).then_some(colliders.colliders.len())?
-            }
-            _ => return outcome.remedy(),
-        };
-        Some(allowed_indices(count))
-    }
-
-    /// Returns the header of the newest topology without a copy of the constraints.
-    fn load_header(&mut self, timeout: Duration) -> Option<LoadHeader> {
-        let Attachment { services, source, .. } = &self.attachment;
-        let create = || Latch::create(&services.topology, &TOPOLOGY, source);
-        let latch = get_or_create(&mut self.topology, create).ok()?;
-        let header = self.watch.wait_for(&self.attachment, timeout, || {
-            Ok(latch.newest(&self.attachment)?.map(|sample| *sample.user_header()))
-        });
-        header.ok()?
     }
 }
 
@@ -90,8 +53,7 @@ fn missing_condition(action: &Action) -> Option<&'static str> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::messages::command::Command;
-    use crate::messages::outcome::OUTCOME_FLAG_CONTROL;
+    use crate::command::{Command, OUTCOME_FLAG_CONTROL};
 
     fn remedy(action: Action, reason: Reason, flags: u32) -> Option<String> {
         let outcome = Outcome::new(0, 1, Command::new(1, 1, action), Err(reason));

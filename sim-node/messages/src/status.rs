@@ -1,10 +1,11 @@
 //! The messages of the service `status`.
 
 use bytemuck::{Pod, Zeroable};
-use iceoryx2::prelude::ZeroCopySend;
+use iceoryx2_bb_derive_macros::ZeroCopySend;
+use iceoryx2_bb_elementary_traits::zero_copy_send::ZeroCopySend;
 
 use crate::limits::MEMBERS_MAX;
-use crate::messages::member_changes::MemberChanges;
+use crate::lockstep::MemberChanges;
 
 /// Status of a node or replay: 1376 bytes, alignment 8. Written by the owner of the name at 10 Hz, and at
 /// once after a change of the members, before the step that follows it. Percentiles cover the steps of the last second.
