@@ -7,9 +7,10 @@ use std::process::Command;
 
 /// Programs, as `cargo run` builds them, and every package, as `cargo test` does.
 const PROGRAMS: [&str; 5] = ["sim-node", "sim-c", "recorder", "viewer-bridge", "integration-tests"];
-const PACKAGES: [&str; 12] = [
+const PACKAGES: [&str; 13] = [
     "sim-c",
     "sim-types",
+    "sim-host",
     "sim-messages",
     "sim-cli",
     "sim-contract",

@@ -48,13 +48,10 @@
 #![forbid(unsafe_code)]
 
 mod client;
-pub mod clock;
 mod domain;
 mod endpoint;
-mod files;
 mod owner;
 mod ports;
-mod process;
 mod scratch_domain;
 pub mod testing;
 
@@ -71,11 +68,6 @@ pub use domain::Domain;
 pub use domain::config_file::{ConfigFile, ConfigFileError};
 pub use domain::nodes::{ListedNode, NodeAnswer};
 pub use endpoint::{DOMAIN_VARIABLE, Endpoint, EndpointError, NAME_DEFAULT};
-pub use files::kind::kind_of_non_file;
-pub use files::part_file::error::{PartFileError, explain_write_error};
-pub use files::part_file::{Existing, PartFile, part_path};
-pub use files::place::is_being_written;
-pub use files::text_file::{TextFileError, read_scene_file, to_text};
 pub use owner::Owner;
 pub use owner::error::OwnerError;
 pub use owner::load::Load;
@@ -89,9 +81,10 @@ pub use ports::service::ServiceError;
 pub use ports::services::AttachError;
 pub use ports::wake::Wake;
 pub use ports::writer::PublishError;
-pub use process::bus_error::report_bus_errors;
-pub use process::console;
-pub use process::file_size::report_file_size_limit;
-pub use process::stop::Stop;
 pub use scratch_domain::ScratchDomain;
+pub use sim_host::{
+    Existing, PartFile, PartFileError, Stop, TextFileError, clock, console, explain_write_error,
+    is_being_written, kind_of_non_file, part_path, read_scene_file, report_bus_errors,
+    report_file_size_limit, to_text,
+};
 pub use sim_messages::*;

@@ -6,9 +6,8 @@
 
 use std::collections::VecDeque;
 
+use sim_host::clock::SECOND_NS;
 use sim_messages::{ParticleState, SNAPSHOTS_BUFFERED, SnapshotHeader, Update};
-
-use crate::clock::SECOND_NS;
 
 /// Shortest wait of a snapshot: several rounds of a tunnel that looks for messages every 2 ms.
 const WAIT_MIN_NS: u64 = SECOND_NS / 20;

@@ -3,9 +3,10 @@
 use std::num::NonZeroU32;
 use std::time::Duration;
 
+use sim_host::clock::Deadline;
+
 use crate::client::Client;
 use crate::client::lockstep::{LockstepError, Member};
-use crate::clock::Deadline;
 
 impl Client {
     /// Joins the lockstep: from now on, the node computes the step after a snapshot only when this client

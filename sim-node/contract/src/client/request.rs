@@ -5,13 +5,13 @@ use std::fmt;
 use std::time::Duration;
 
 use bytemuck::bytes_of;
+use sim_host::clock::epoch_microseconds;
 use sim_messages::{
     Action, COMMANDS_BUFFERED, COMMANDS_PER_STEP_MAX, CONSOLE_CLIENT_ID, Command, GivenState,
     OUTCOME_FLAG_CONTROL, OUTCOMES_BUFFERED, Outcome, RestoreHeader,
 };
 use thiserror::Error;
 
-use crate::clock::epoch_microseconds;
 use crate::endpoint::Endpoint;
 use crate::ports::port::reader_count;
 use crate::ports::reader::{Drained, ReadError, ValueReader};

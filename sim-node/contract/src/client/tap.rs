@@ -4,6 +4,7 @@ use std::num::NonZeroU32;
 use std::sync::Arc;
 use std::time::Duration;
 
+use sim_host::clock::monotonic_ns;
 use sim_messages::{
     BendState, COMMANDS_PER_STEP_MAX, ColliderState, CollidersHeader, ConstraintState, ForceRow,
     ForcesHeader, KeyframeHeader, LoadHeader, NodeStatus, OUTCOMES_BUFFERED, Outcome,
@@ -18,7 +19,6 @@ use crate::client::repeats::Repeats;
 use crate::client::request::random_client_id;
 use crate::client::state::{State, StateAssembler};
 use crate::client::watch::listen;
-use crate::clock::monotonic_ns;
 use crate::endpoint::Endpoint;
 use crate::ports::reader::{Drained, ReadError, SliceReader, SliceSample, ValueReader};
 use crate::ports::service::{

@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use iceoryx2::port::listener::ListenerCreateError;
+use sim_host::clock::Deadline;
 
-use crate::clock::Deadline;
 use crate::ports::port::{PortLimit, create_port};
 use crate::ports::reader::ReadError;
 use crate::ports::service::{ServiceError, WAKE};

@@ -5,10 +5,10 @@ use std::thread;
 use std::time::Duration;
 
 use iceoryx2::prelude::{CallbackProgression, Config};
+use sim_host::clock::{self, Deadline};
 use sim_messages::{CONSOLE_CLIENT_ID, NodeStatus};
 
 use crate::client::Client;
-use crate::clock::{self, Deadline};
 use crate::endpoint::Endpoint;
 use crate::ports::domain::owner_lock::OwnerLock;
 use crate::ports::domain::{lock_list, root, unfinished};

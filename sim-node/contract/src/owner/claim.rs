@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
+use sim_host::clock::{self, Deadline};
 use sim_messages::NodeStatus;
 
-use crate::clock::{self, Deadline};
 use crate::endpoint::Endpoint;
 use crate::owner::error::OwnerError;
 use crate::ports::domain::owner_lock::{LockError, OwnerLock};

@@ -8,12 +8,12 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use iceoryx2::prelude::PortFactory;
+use sim_host::clock::{Deadline, SECOND_NS, monotonic_ns};
 use sim_messages::{
     FAR_SILENCE_MAX_MS, MIRROR_BORROWED_MIN, MIRROR_BUFFERED_MIN, NodeStatus, ParticleState, Ready,
     SnapshotHeader,
 };
 
-use crate::clock::{Deadline, SECOND_NS, monotonic_ns};
 use crate::ports::reader::ValueReader;
 use crate::ports::service::{PARTICLES, READY, STATUS, ServiceError};
 use crate::ports::session::{Session, Slices, Values};

@@ -12,7 +12,6 @@ mod late_joiner;
 mod layout;
 mod load;
 mod ownership;
-mod part_file;
 mod readers;
 mod services_page;
 mod states;

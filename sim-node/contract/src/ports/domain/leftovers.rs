@@ -8,8 +8,8 @@ use std::time::Duration;
 
 use iceoryx2::node::NodeView;
 use iceoryx2::prelude::{CallbackProgression, Config, Node, NodeState, ipc_threadsafe};
+use sim_host::clock;
 
-use crate::clock;
 use crate::ports::domain::files::segments;
 use crate::ports::domain::owner_lock::OwnerLock;
 use crate::ports::domain::{lock_list, mapped, root, unfinished};

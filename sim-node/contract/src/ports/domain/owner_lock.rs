@@ -6,9 +6,11 @@ use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 
 use iceoryx2::prelude::Config;
+use sim_host::{
+    clock::{SECOND_NS, monotonic_ns, sleep_until},
+    is_in_place, is_locked,
+};
 
-use crate::clock::{SECOND_NS, monotonic_ns, sleep_until};
-use crate::files::place::{is_in_place, is_locked};
 use crate::ports::domain::files::SHARED_MEMORY;
 use crate::ports::domain::root;
 

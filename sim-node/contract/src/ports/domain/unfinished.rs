@@ -13,8 +13,8 @@ use iceoryx2::prelude::{
 };
 use iceoryx2::service::service_hash::ServiceHash;
 use iceoryx2::service::{Service, ServiceDetails};
+use sim_host::clock::{self, Deadline};
 
-use crate::clock::{self, Deadline};
 use crate::ports::domain::files::{entries, segment, segments};
 use crate::ports::domain::root;
 use crate::ports::service::{SERVICES, ServiceSpec};

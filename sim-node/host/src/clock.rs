@@ -10,7 +10,7 @@ use rustix::time::{ClockId, Timespec, clock_gettime};
 /// Nanoseconds in a second.
 pub const SECOND_NS: u64 = 1_000_000_000;
 
-/// CLOCK_MONOTONIC in nanoseconds: the clock of [`crate::SnapshotHeader::publish_monotonic_ns`].
+/// CLOCK_MONOTONIC in nanoseconds: the clock of `SnapshotHeader::publish_monotonic_ns`.
 pub fn monotonic_ns() -> u64 {
     nanoseconds(clock_gettime(ClockId::Monotonic))
 }
@@ -44,7 +44,7 @@ fn nanoseconds(time: Timespec) -> u64 {
 
 /// The end of a wait, on the monotonic clock.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Deadline {
+pub struct Deadline {
     /// `None` if the deadline lies beyond the range of the clock.
     end: Option<Instant>,
 }
@@ -52,19 +52,19 @@ pub(crate) struct Deadline {
 impl Deadline {
     /// Returns the deadline `timeout` from now.
     #[allow(clippy::disallowed_methods, reason = "clocks are read here")]
-    pub(crate) fn after(timeout: Duration) -> Self {
+    pub fn after(timeout: Duration) -> Self {
         Self { end: Instant::now().checked_add(timeout) }
     }
 
     /// Returns the time until the deadline; zero once it has passed.
     #[allow(clippy::disallowed_methods, reason = "clocks are read here")]
-    pub(crate) fn remaining(self) -> Duration {
+    pub fn remaining(self) -> Duration {
         self.end.map_or(Duration::MAX, |end| end.saturating_duration_since(Instant::now()))
     }
 }
 
 /// Time since a file was last written; zero if that lies in the future.
-pub(crate) fn age(file: &Metadata) -> Duration {
+pub fn age(file: &Metadata) -> Duration {
     let written_ns =
         i128::from(file.mtime()) * i128::from(SECOND_NS) + i128::from(file.mtime_nsec());
     let age_ns = (i128::from(realtime_ns()) - written_ns).max(0);
@@ -72,6 +72,6 @@ pub(crate) fn age(file: &Metadata) -> Duration {
 }
 
 /// Microseconds since the Unix epoch, below 2^53 until 2255.
-pub(crate) fn epoch_microseconds() -> u64 {
+pub fn epoch_microseconds() -> u64 {
     realtime_ns() / 1000
 }

@@ -1,16 +1,45 @@
-//! The lock that keeps two programs from writing the same file.
+//! The kind of a file, its place, and the lock that keeps two programs from writing it.
 
-use std::fs::{self, File, TryLockError};
-use std::os::unix::fs::MetadataExt;
+use std::fs::{self, File, FileType, Metadata, TryLockError};
+use std::os::unix::fs::{FileTypeExt, MetadataExt};
 use std::path::Path;
 
 use rustix::fs::{major, minor};
 
-use crate::files::place::is_in_place;
+/// Returns the kind of a file with its article, such as "a directory"; `None` for a regular file.
+pub fn kind_of_non_file(file_type: FileType) -> Option<&'static str> {
+    match file_type {
+        _ if file_type.is_file() => None,
+        _ if file_type.is_dir() => Some("a directory"),
+        _ if file_type.is_fifo() => Some("a named pipe (FIFO)"),
+        _ if file_type.is_socket() => Some("a socket"),
+        _ => Some("a device"),
+    }
+}
+
+/// Returns `true` if a path still names an open file. Another process may have removed, renamed or
+/// replaced it in the meantime.
+pub fn is_in_place(file: &File, path: &Path) -> bool {
+    let inode = |metadata: Metadata| (metadata.dev(), metadata.ino());
+    let (open, named) = (file.metadata().map(inode), fs::metadata(path).map(inode));
+    matches!((open, named), (Ok(open), Ok(named)) if open == named)
+}
+
+/// Returns `true` if a program of this project is writing a file. Returns `false` if the file cannot be
+/// opened.
+pub fn is_being_written(path: &Path) -> bool {
+    File::open(path).is_ok_and(|file| is_locked(&file))
+}
+
+/// Returns `true` if another open file holds the exclusive lock of a file. Otherwise this one holds a
+/// shared lock, until it is closed.
+pub fn is_locked(file: &File) -> bool {
+    matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock))
+}
 
 /// Result of locking a file that is open for writing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Lock {
+pub(crate) enum Lock {
     /// This process holds the lock until it closes the file.
     Held,
     /// Another open file holds the lock.
@@ -23,7 +52,7 @@ pub(super) enum Lock {
 }
 
 /// Locks a file that was opened as `path`. A file system without locks cannot refuse a second writer.
-pub(super) fn lock(file: &File, path: &Path) -> Lock {
+pub(crate) fn lock(file: &File, path: &Path) -> Lock {
     if let Err(TryLockError::WouldBlock) = file.try_lock() {
         return Lock::Taken { process_id: holder(file) };
     }
@@ -32,7 +61,7 @@ pub(super) fn lock(file: &File, path: &Path) -> Lock {
 }
 
 /// Returns the process that holds the lock of a file.
-pub(super) fn holder(file: &File) -> Option<u32> {
+pub(crate) fn holder(file: &File) -> Option<u32> {
     let file = file.metadata().ok()?;
     let device = file.dev();
     let id = format!("{:02x}:{:02x}:{}", major(device), minor(device), file.ino());

@@ -11,7 +11,7 @@ use std::os::fd::AsFd;
 
 use rustix::event::{PollFd, PollFlags, poll};
 use rustix::time::Timespec;
-use sim_messages::{printable, printable_line};
+use sim_types::{printable, printable_line};
 
 /// Writes a result to stdout, past every buffer: the end of a program ignores errors.
 ///

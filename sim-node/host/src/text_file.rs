@@ -8,10 +8,10 @@ use std::path::Path;
 use rustix::fs::OFlags;
 use thiserror::Error;
 
-use sim_messages::SCENE_SIZE_BYTES_MAX;
+use sim_types::SCENE_SIZE_BYTES_MAX;
 
-use crate::files::kind::kind_of_non_file;
-use crate::files::mesh_format::other_format;
+use crate::file_lock::kind_of_non_file;
+use crate::mesh_format::other_format;
 
 /// Error of reading a text file.
 #[derive(Debug, Error)]

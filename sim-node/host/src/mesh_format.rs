@@ -24,7 +24,7 @@ const STL_SIZES_BYTES: [usize; 3] = [80, 4, 50];
 
 /// Returns the format of a file that is neither a scene nor an OBJ mesh, if it has a known one. `bytes` is
 /// its beginning.
-pub(super) fn other_format(bytes: &[u8], size_bytes: u64) -> Option<&'static str> {
+pub(crate) fn other_format(bytes: &[u8], size_bytes: u64) -> Option<&'static str> {
     let signature = SIGNATURES.into_iter().find(|(start, _)| bytes.starts_with(start));
     signature
         .map(|(_, name)| name)

@@ -1,9 +1,7 @@
 //! A file that gets its name only when it is finished.
 
-mod allocation;
 mod disk;
 pub(crate) mod error;
-mod lock;
 
 use std::ffi::OsString;
 use std::fs::{self, File, OpenOptions};
@@ -13,12 +11,9 @@ use std::path::{Path, PathBuf};
 use rustix::fs::{Access, CWD, RenameFlags, access, renameat_with};
 use rustix::io::Errno;
 
-use crate::files::kind::kind_of_non_file;
-use crate::files::place::is_locked;
-use allocation::Allocation;
-use disk::DiskFile;
+use crate::file_lock::{Lock, holder, is_locked, kind_of_non_file, lock};
+use disk::{Allocation, DiskFile};
 use error::{PartFileError, io_error};
-use lock::Lock;
 
 /// Bytes to buffer before a write to the operating system.
 const BUFFER_SIZE_BYTES: usize = 1 << 18;
@@ -267,7 +262,7 @@ fn open_locked(path: &Path, existing: Existing) -> Result<File, PartFileError> {
             },
             Err(error) => return Err(io_error(error)),
         };
-        match lock::lock(&file, path) {
+        match lock(&file, path) {
             Lock::Taken { process_id } => {
                 return Err(PartFileError::InUse { path: path.to_owned(), process_id });
             }
@@ -285,7 +280,7 @@ fn check_unused(path: &Path) -> Result<(), PartFileError> {
     check_kind(path)?;
     match File::open(path) {
         Ok(file) if is_locked(&file) => {
-            let process_id = lock::holder(&file);
+            let process_id = holder(&file);
             Err(PartFileError::InUse { path: path.to_owned(), process_id })
         }
         // Later errors report a file that cannot be opened.

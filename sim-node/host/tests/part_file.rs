@@ -1,10 +1,11 @@
 //! A file gets its name only when it is finished, and nothing is replaced without permission.
+#![allow(clippy::unwrap_used, reason = "an error fails the test, also in helpers")]
 
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use sim_contract::{Existing, PartFile, PartFileError};
+use sim_host::{Existing, PartFile, PartFileError};
 
 /// The directory of a test, which is removed at its end.
 struct Directory(PathBuf);
