@@ -30,7 +30,7 @@ use crate::client::views::{Bends, Colliders, Forces, Parameters, Snapshot, Surfa
 use crate::client::watch::Watch;
 use crate::endpoint::Endpoint;
 use crate::ports::latch::Latch;
-use crate::ports::reader::{ReadError, SliceReader, ValueReader};
+use crate::ports::reader::{ReadError, Reader};
 use crate::ports::service::{
     BENDS, COLLIDERS, PARAMETERS, PARTICLES, SCENE, STATUS, SURFACE, ServiceError, TEARS, TOPOLOGY,
 };
@@ -49,7 +49,7 @@ use crate::ports::services::{AttachError, Attachment};
 pub struct Client {
     id: u64,
     watch: Watch,
-    particles: Option<SliceReader<ParticleState, SnapshotHeader>>,
+    particles: Option<Reader<ParticleState, SnapshotHeader>>,
     topology: Option<Latch<ConstraintState, LoadHeader>>,
     bends: Option<Latch<BendState, LoadHeader>>,
     surface: Option<Latch<Triangle, LoadHeader>>,
@@ -494,20 +494,20 @@ impl Drop for Client {
 /// A reader of the status that keeps the newest one.
 #[derive(Debug)]
 struct StatusReader {
-    reader: ValueReader<NodeStatus>,
+    reader: Reader<NodeStatus>,
     newest: Option<NodeStatus>,
     is_unread: bool,
 }
 
 impl StatusReader {
     fn create(attachment: &Attachment) -> Result<Self, ServiceError> {
-        let reader = ValueReader::create(&attachment.status, &STATUS, &attachment.source)?;
+        let reader = Reader::create(&attachment.status, &STATUS, &attachment.source)?;
         Ok(Self { reader, newest: None, is_unread: false })
     }
 
     /// Returns the newest status that has arrived, read or not.
     fn receive(&mut self) -> Result<Option<&NodeStatus>, ReadError> {
-        if let Some(status) = self.reader.newest()? {
+        if let Some(status) = self.reader.newest_value()? {
             (self.newest, self.is_unread) = (Some(status), true);
         }
         Ok(self.newest.as_ref())
@@ -524,11 +524,11 @@ impl StatusReader {
 }
 
 fn open_particles<'a>(
-    reader: &'a mut Option<SliceReader<ParticleState, SnapshotHeader>>,
+    reader: &'a mut Option<Reader<ParticleState, SnapshotHeader>>,
     attachment: &Attachment,
-) -> Result<&'a mut SliceReader<ParticleState, SnapshotHeader>, ServiceError> {
+) -> Result<&'a mut Reader<ParticleState, SnapshotHeader>, ServiceError> {
     let Attachment { services, source, .. } = attachment;
-    get_or_create(reader, || SliceReader::create(&services.particles, &PARTICLES, source))
+    get_or_create(reader, || Reader::create(&services.particles, &PARTICLES, source))
 }
 
 fn open_commander<'a>(
@@ -555,9 +555,10 @@ mod tests {
     use super::*;
     use crate::owner::Owner;
     use crate::owner::load::Load;
+    use crate::ports::port::Service;
     use crate::ports::service::OUTCOMES;
-    use crate::ports::session::{Access, Session, Slices};
-    use crate::ports::writer::{Capacity, SliceWriter, ValueWriter};
+    use crate::ports::session::{Access, Session};
+    use crate::ports::writer::{Capacity, Writer};
     use crate::testing::TestDomain;
     use sim_messages::Command;
 
@@ -587,26 +588,26 @@ mod tests {
         read_nothing();
 
         // The messages of a writer vanish with it, so the writers live until the end.
-        let service: Slices<ParticleState, SnapshotHeader> =
-            session.slices(&PARTICLES, Access::Open).unwrap();
-        let particles = SliceWriter::create(config, &service, capacity).unwrap();
+        let service: Service<ParticleState, SnapshotHeader> =
+            session.service(&PARTICLES, Access::Open).unwrap();
+        let particles = Writer::create(config, &service, capacity).unwrap();
         let header = SnapshotHeader { run_id: FOREIGN, ..SnapshotHeader::default() };
         particles.write(header, |_| ParticleState::default()).unwrap();
 
-        let service: Slices<ConstraintState, LoadHeader> =
-            session.slices(&TOPOLOGY, Access::Open).unwrap();
-        let topology = SliceWriter::create(config, &service, capacity).unwrap();
+        let service: Service<ConstraintState, LoadHeader> =
+            session.service(&TOPOLOGY, Access::Open).unwrap();
+        let topology = Writer::create(config, &service, capacity).unwrap();
         let header = LoadHeader { run_id: FOREIGN, ..LoadHeader::default() };
         topology.write(header, |_| unreachable!()).unwrap();
 
-        let service = session.values(&STATUS, Access::Open).unwrap();
-        let status = ValueWriter::create(config, &service, &STATUS).unwrap();
-        status.write(NodeStatus { run_id: FOREIGN, ..NodeStatus::default() }).unwrap();
+        let service = session.service(&STATUS, Access::Open).unwrap();
+        let status = Writer::of_values(config, &service, &STATUS).unwrap();
+        status.send_value(NodeStatus { run_id: FOREIGN, ..NodeStatus::default() }).unwrap();
 
-        let service = session.values(&OUTCOMES, Access::Open).unwrap();
-        let outcomes = ValueWriter::create(config, &service, &OUTCOMES).unwrap();
+        let service = session.service(&OUTCOMES, Access::Open).unwrap();
+        let outcomes = Writer::of_values(config, &service, &OUTCOMES).unwrap();
         let command = Command::new(3, sequence, Action::Pause);
-        outcomes.write(Outcome::new(0, 1, command, Ok(()))).unwrap();
+        outcomes.send_value(Outcome::new(0, 1, command, Ok(()))).unwrap();
         read_nothing();
 
         owner.publish_status(&NodeStatus { run_id: OWNED, ..NodeStatus::default() }).unwrap();

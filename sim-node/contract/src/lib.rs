@@ -45,7 +45,7 @@
 //! | wake | [`Wake`] events | after a snapshot, load, tear, outcome or status, and when the owner goes |
 //!
 //! This crate knows no solver, and no other crate knows iceoryx2.
-#![forbid(unsafe_code)]
+#![deny(unsafe_code)]
 
 mod client;
 mod domain;

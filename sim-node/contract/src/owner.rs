@@ -14,8 +14,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use iceoryx2::port::notifier::NotifierCreateError;
-use iceoryx2::port::subscriber::Subscriber;
-use iceoryx2::prelude::{PortFactory, ipc_threadsafe};
+use iceoryx2::prelude::PortFactory;
 use sim_messages::{
     COMMANDS_BUFFERED, CONTRACT_VERSION, ColliderState, CollidersHeader, Command, KeyframeHeader,
     LoadHeader, MalformedState, NodeStatus, Outcome, ParameterValues, ParticleState,
@@ -33,14 +32,13 @@ use crate::ports::connection::{self, ConnectionId, ReceivedCommand, receive_held
 use crate::ports::domain::orphans;
 use crate::ports::domain::owner_lock::OwnerLock;
 use crate::ports::domain::unfinished;
-use crate::ports::port::{PortLimit, create_port, reader_count};
-use crate::ports::reader::subscribe;
+use crate::ports::port::{PortLimit, Service, create_port, reader_count};
+use crate::ports::reader::Reader;
 use crate::ports::service::{COMMANDS, OUTCOMES, READY, RESTORE, STATUS, ServiceError, WAKE};
 use crate::ports::services::Services;
-use crate::ports::session::{Access, Events, Session, Values};
+use crate::ports::session::{Access, Events, Session};
 use crate::ports::wake::{Wake, WakeSender};
-use crate::ports::writer::PublishError;
-use crate::ports::writer::ValueWriter;
+use crate::ports::writer::{PublishError, Writer};
 
 /// The process that owns a name: it publishes everything and receives the commands.
 ///
@@ -53,11 +51,11 @@ pub struct Owner {
     // is gone when they wake. The name is free once all services are removed.
     preparation: Preparation,
     writers: LoadWriters,
-    outcomes: ValueWriter<Outcome>,
-    commands: Subscriber<ipc_threadsafe::Service, Command, ()>,
-    ready: Subscriber<ipc_threadsafe::Service, Ready, ()>,
-    restore: Subscriber<ipc_threadsafe::Service, [u8], RestoreHeader>,
-    status: ValueWriter<NodeStatus>,
+    outcomes: Writer<Outcome>,
+    commands: Reader<Command>,
+    ready: Reader<Ready>,
+    restore: Reader<u8, RestoreHeader>,
+    status: Writer<NodeStatus>,
     wake: WakeSender,
     /// The request of a far reader.
     repetition: Repetition,
@@ -68,7 +66,7 @@ pub struct Owner {
     /// The run of the last list of colliders, and the number of lists that it has published.
     collider_lists: Cell<(u64, u32)>,
     services: Arc<Services>,
-    status_service: Values<NodeStatus>,
+    status_service: Service<NodeStatus>,
     // Dropped after the services, which belong to its node.
     session: Session,
     lock: OwnerLock,
@@ -99,7 +97,7 @@ impl Owner {
         let lock = take_lock(endpoint)?;
         let session = Session::join_with_version(endpoint, contract_version)?;
         unfinished::remove_nodes(session.config());
-        let status_service = session.values(&STATUS, Access::Create)?;
+        let status_service = session.service(&STATUS, Access::Create)?;
         // The memory of a killed predecessor is free now.
         check_memory(load)?;
         let status = claim_name(&session, &status_service)?;
@@ -108,10 +106,10 @@ impl Owner {
         let owner = Self {
             preparation: Preparation::new(Arc::clone(&services)),
             wake: wake_sender(&services.wake)?,
-            commands: subscribe(&services.commands, &COMMANDS)?,
-            ready: subscribe(&services.ready, &READY)?,
-            restore: subscribe(&services.restore, &RESTORE)?,
-            outcomes: ValueWriter::create(&services.config, &services.outcomes, &OUTCOMES)?,
+            commands: Reader::of_every_publisher(&services.commands, &COMMANDS)?,
+            ready: Reader::of_every_publisher(&services.ready, &READY)?,
+            restore: Reader::of_every_publisher(&services.restore, &RESTORE)?,
+            outcomes: Writer::of_values(&services.config, &services.outcomes, &OUTCOMES)?,
             writers: LoadWriters::create(&services, load)?,
             status,
             repetition: Repetition::default(),
@@ -262,7 +260,7 @@ impl Owner {
     /// # Errors
     /// No memory.
     pub fn publish_outcome(&self, outcome: &Outcome) -> Result<(), PublishError> {
-        self.outcomes.write(*outcome).map(|_| ())
+        self.outcomes.send_value(*outcome).map(|_| ())
     }
 
     /// Publishes the status of the node.
@@ -270,7 +268,7 @@ impl Owner {
     /// # Errors
     /// No memory.
     pub fn publish_status(&self, status: &NodeStatus) -> Result<(), PublishError> {
-        self.status.write(*status).map(|_| ())
+        self.status.send_value(*status).map(|_| ())
     }
 
     /// Appends the commands that have arrived, those of each connection in the order of sending, and at
@@ -404,9 +402,10 @@ mod tests {
 
     use super::*;
     use crate::client::Client;
+    use crate::ports::port::Service;
     use crate::ports::service::SURFACE;
-    use crate::ports::session::Slices;
     use crate::ports::wake::{WakeCause, WakeListener};
+    use crate::ports::writer::Capacity;
     use crate::testing::TestDomain;
 
     /// Longer than any step of the test takes.
@@ -430,7 +429,8 @@ mod tests {
         let domain = TestDomain::new();
         let mut owner = Owner::create(&domain.endpoint(), &load(1)).unwrap();
         let session = Session::join(&domain.endpoint()).unwrap();
-        let service: Slices<Triangle, LoadHeader> = session.slices(&SURFACE, Access::Open).unwrap();
+        let service: Service<Triangle, LoadHeader> =
+            session.service(&SURFACE, Access::Open).unwrap();
         // A tunnel has the spare place; another program has the place that a load needs.
         let other_publishers: Vec<_> = (1..OWNER_PUBLISHERS_MAX)
             .map(|_| service.publisher_builder().create().unwrap())
@@ -484,12 +484,12 @@ mod tests {
         let domain = TestDomain::new();
         let owner = Owner::create(&domain.endpoint(), &load(0)).unwrap();
         let session = Session::join(&domain.endpoint()).unwrap();
-        let service: Slices<u8, RestoreHeader> = session.slices(&RESTORE, Access::Open).unwrap();
-        let stranger = service.publisher_builder().initial_max_slice_len(40).create().unwrap();
+        let service: Service<u8, RestoreHeader> = session.service(&RESTORE, Access::Open).unwrap();
+        let capacity = Capacity { len_max: 40, samples: 8 };
+        let stranger = Writer::create(session.config(), &service, capacity).unwrap();
         let give = |header: RestoreHeader| {
-            let mut sample = stranger.loan_slice(33).unwrap();
-            *sample.user_header_mut() = RestoreHeader { client_id: 7, sequence: 3, ..header };
-            sample.send().unwrap();
+            let header = RestoreHeader { client_id: 7, sequence: 3, ..header };
+            stranger.send_elements(header, 33, |_| 0).unwrap();
             let mut states = Vec::new();
             owner.receive_states(&mut states);
             let (received, state) = states.pop().unwrap();

@@ -8,6 +8,7 @@ pub(crate) mod latch;
 pub(crate) mod memory;
 pub(crate) mod mirror;
 pub(crate) mod port;
+pub(crate) mod raw;
 pub(crate) mod reader;
 pub(crate) mod service;
 pub(crate) mod services;

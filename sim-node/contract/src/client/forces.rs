@@ -3,15 +3,15 @@
 use sim_messages::{ForceRow, ForcesHeader, SnapshotHeader};
 
 use crate::client::views::Forces;
-use crate::ports::reader::{ReadError, SliceReader, SliceSample};
+use crate::ports::reader::{ReadError, Reader, Sample};
 use crate::ports::service::{FORCES, ServiceError};
 use crate::ports::services::Attachment;
 
 /// A reader that keeps the message that it read last.
 #[derive(Debug)]
 pub(crate) struct ForcesReader {
-    reader: SliceReader<ForceRow, ForcesHeader>,
-    kept: Option<SliceSample<ForceRow, ForcesHeader>>,
+    reader: Reader<ForceRow, ForcesHeader>,
+    kept: Option<Sample<ForceRow, ForcesHeader>>,
 }
 
 /// Forces of a step that have arrived, or will not come.
@@ -25,7 +25,7 @@ pub(crate) enum Search {
 impl ForcesReader {
     pub(crate) fn create(attachment: &Attachment) -> Result<Self, ServiceError> {
         let Attachment { services, source, .. } = attachment;
-        Ok(Self { reader: SliceReader::create(&services.forces, &FORCES, source)?, kept: None })
+        Ok(Self { reader: Reader::create(&services.forces, &FORCES, source)?, kept: None })
     }
 
     /// Reads all messages, and returns the last one.
@@ -53,6 +53,6 @@ impl ForcesReader {
     }
 }
 
-fn to_forces(sample: &SliceSample<ForceRow, ForcesHeader>) -> Forces {
+fn to_forces(sample: &Sample<ForceRow, ForcesHeader>) -> Forces {
     Forces { header: *sample.user_header(), rows: sample.payload().to_vec() }
 }

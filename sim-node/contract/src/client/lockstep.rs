@@ -12,7 +12,7 @@ use crate::client::request::OwnerState;
 use crate::ports::reader::ReadError;
 use crate::ports::service::{READY, ServiceError};
 use crate::ports::services::{AttachError, Attachment};
-use crate::ports::writer::{PublishError, ValueWriter};
+use crate::ports::writer::{PublishError, Writer};
 
 /// Error of a member of the lockstep.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -59,7 +59,7 @@ struct Next {
 /// A member's side of the lockstep.
 #[derive(Debug)]
 pub(crate) struct Member {
-    writer: ValueWriter<Ready>,
+    writer: Writer<Ready>,
     turns: Turns,
     /// The node has been asked for the membership.
     has_asked: bool,
@@ -72,13 +72,13 @@ impl Member {
         every: NonZeroU32,
     ) -> Result<Self, ServiceError> {
         let services = &attachment.services;
-        let writer = ValueWriter::create(&services.config, &services.ready, &READY)?;
+        let writer = Writer::of_values(&services.config, &services.ready, &READY)?;
         Ok(Self { writer, turns: Turns::new(client_id, every), has_asked: false })
     }
 
     /// Asks the node for the membership.
     pub(crate) fn join(&mut self) -> Result<(), LockstepError> {
-        self.writer.write(self.turns.message)?;
+        self.writer.send_value(self.turns.message)?;
         self.has_asked = true;
         Ok(())
     }
@@ -114,7 +114,7 @@ impl Member {
     /// Ends the turn, if one has begun.
     pub(crate) fn ready(&mut self) -> Result<(), LockstepError> {
         if self.turns.is_in_turn {
-            self.writer.write(self.turns.message)?;
+            self.writer.send_value(self.turns.message)?;
             self.turns.is_in_turn = false;
         }
         Ok(())

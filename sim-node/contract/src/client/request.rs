@@ -14,10 +14,10 @@ use thiserror::Error;
 
 use crate::endpoint::Endpoint;
 use crate::ports::port::reader_count;
-use crate::ports::reader::{Drained, ReadError, ValueReader};
+use crate::ports::reader::{Drained, ReadError, Reader};
 use crate::ports::service::{COMMANDS, OUTCOMES, ServiceError};
 use crate::ports::services::{AttachError, Attachment, OwnerProcess};
-use crate::ports::writer::{Capacity, PublishError, SliceWriter, ValueWriter};
+use crate::ports::writer::{Capacity, PublishError, Writer};
 
 /// Error of a request: the command has no outcome.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -140,7 +140,7 @@ impl RequestError {
 const UNANSWERED_MAX: usize = 32 * COMMANDS_PER_STEP_MAX;
 
 /// The writer of one state.
-pub(crate) type StateWriter = SliceWriter<u8, RestoreHeader>;
+pub(crate) type StateWriter = Writer<u8, RestoreHeader>;
 
 /// Returns the id of a new client. Ids below 2^53 are exact in JSON.
 pub(crate) fn random_client_id() -> Result<u64, AttachError> {
@@ -160,8 +160,8 @@ pub(crate) struct Commander {
     /// Outcomes that arrived while the client waited for another, in the order of application; at most
     /// [`OUTCOMES_BUFFERED`].
     answered: VecDeque<Outcome>,
-    commands: ValueWriter<Command>,
-    outcomes: ValueReader<Outcome>,
+    commands: Writer<Command>,
+    outcomes: Reader<Outcome>,
     gaps: OutcomeGaps,
 }
 
@@ -198,8 +198,8 @@ impl Commander {
             gaps: OutcomeGaps::default(),
             unanswered: VecDeque::new(),
             answered: VecDeque::new(),
-            outcomes: ValueReader::create(&services.outcomes, &OUTCOMES, source)?,
-            commands: ValueWriter::create(&services.config, &services.commands, &COMMANDS)?,
+            outcomes: Reader::create(&services.outcomes, &OUTCOMES, source)?,
+            commands: Writer::of_values(&services.config, &services.commands, &COMMANDS)?,
         })
     }
 
@@ -212,7 +212,7 @@ impl Commander {
         self.receive_outcomes()?;
         let sequence = self.next_sequence();
         let command = Command::new(self.client_id, sequence, action);
-        let receiver_count = self.commands.write(command)?;
+        let receiver_count = self.commands.send_value(command)?;
         if receiver_count == 0 {
             let owner = OwnerState::query(attachment);
             return Err(match reader_count(&attachment.services.commands) {
@@ -245,7 +245,7 @@ impl Commander {
         let services = &attachment.services;
         let len_max = usize::try_from(header.size_bytes).unwrap_or(usize::MAX);
         let capacity = Capacity { len_max, samples: 1 };
-        let writer = SliceWriter::create(&services.config, &services.restore, capacity)?;
+        let writer = Writer::create(&services.config, &services.restore, capacity)?;
         if writer.send(header, |index| state.byte(index))? == 0 {
             return Err(RequestError::NoReceiver { owner: OwnerState::query(attachment) });
         }
@@ -257,7 +257,7 @@ impl Commander {
     /// Receives all outcomes, and keeps those of unanswered commands.
     pub(crate) fn receive_outcomes(&mut self) -> Result<(), ReadError> {
         let mut drained = Drained::default();
-        self.outcomes.drain(&mut drained, |outcome| {
+        self.outcomes.drain_values(&mut drained, |outcome| {
             self.gaps.add(outcome);
             if outcome.command.client_id != self.client_id {
                 return;

@@ -20,7 +20,7 @@ use crate::client::request::random_client_id;
 use crate::client::state::{State, StateAssembler};
 use crate::client::watch::listen;
 use crate::endpoint::Endpoint;
-use crate::ports::reader::{Drained, ReadError, SliceReader, SliceSample, ValueReader};
+use crate::ports::reader::{Drained, ReadError, Reader, Sample};
 use crate::ports::service::{
     BENDS, COLLIDERS, FORCES, KEYFRAME, OUTCOMES, PARAMETERS, PARTICLES, SCENE, STATUS, SURFACE,
     ServiceError, TEARS, TOPOLOGY,
@@ -40,7 +40,7 @@ const _: () = {
 /// A snapshot.
 #[derive(Debug)]
 enum Held {
-    Shared(SliceSample<ParticleState, SnapshotHeader>),
+    Shared(Sample<ParticleState, SnapshotHeader>),
     /// From another host.
     Copied(Copied),
 }
@@ -72,19 +72,19 @@ const ARRIVAL_POLL: Duration = Duration::from_millis(10);
 #[derive(Debug)]
 pub struct Tap {
     listener: WakeListener,
-    outcomes: ValueReader<Outcome>,
-    status: ValueReader<NodeStatus>,
-    colliders: SliceReader<ColliderState, CollidersHeader>,
-    tears: SliceReader<TornConstraint, TearsHeader>,
-    parameters: SliceReader<ParameterState, ParametersHeader>,
-    scene: SliceReader<u8, LoadHeader>,
-    topology: SliceReader<ConstraintState, LoadHeader>,
-    bends: SliceReader<BendState, LoadHeader>,
-    surface: SliceReader<Triangle, LoadHeader>,
+    outcomes: Reader<Outcome>,
+    status: Reader<NodeStatus>,
+    colliders: Reader<ColliderState, CollidersHeader>,
+    tears: Reader<TornConstraint, TearsHeader>,
+    parameters: Reader<ParameterState, ParametersHeader>,
+    scene: Reader<u8, LoadHeader>,
+    topology: Reader<ConstraintState, LoadHeader>,
+    bends: Reader<BendState, LoadHeader>,
+    surface: Reader<Triangle, LoadHeader>,
     /// Only of a tap that reads them.
-    forces: Option<SliceReader<ForceRow, ForcesHeader>>,
-    keyframe: SliceReader<u8, KeyframeHeader>,
-    particles: SliceReader<ParticleState, SnapshotHeader>,
+    forces: Option<Reader<ForceRow, ForcesHeader>>,
+    keyframe: Reader<u8, KeyframeHeader>,
+    particles: Reader<ParticleState, SnapshotHeader>,
     assembler: StateAssembler,
     repeats: Repeats,
     /// The snapshots that have arrived from another host, and wait for other messages.
@@ -141,18 +141,18 @@ impl Tap {
         // Fields are evaluated in the order written here.
         let tap = Self {
             listener: listen(&services.wake)?,
-            outcomes: ValueReader::create(&services.outcomes, &OUTCOMES, owner)?,
-            status: ValueReader::create(&attachment.status, &STATUS, owner)?,
-            colliders: SliceReader::create(&services.colliders, &COLLIDERS, owner)?,
-            tears: SliceReader::create(&services.tears, &TEARS, owner)?,
-            parameters: SliceReader::create(&services.parameters, &PARAMETERS, owner)?,
-            scene: SliceReader::create(&services.scene, &SCENE, owner)?,
-            topology: SliceReader::create(&services.topology, &TOPOLOGY, owner)?,
-            bends: SliceReader::create(&services.bends, &BENDS, owner)?,
-            surface: SliceReader::create(&services.surface, &SURFACE, owner)?,
+            outcomes: Reader::create(&services.outcomes, &OUTCOMES, owner)?,
+            status: Reader::create(&attachment.status, &STATUS, owner)?,
+            colliders: Reader::create(&services.colliders, &COLLIDERS, owner)?,
+            tears: Reader::create(&services.tears, &TEARS, owner)?,
+            parameters: Reader::create(&services.parameters, &PARAMETERS, owner)?,
+            scene: Reader::create(&services.scene, &SCENE, owner)?,
+            topology: Reader::create(&services.topology, &TOPOLOGY, owner)?,
+            bends: Reader::create(&services.bends, &BENDS, owner)?,
+            surface: Reader::create(&services.surface, &SURFACE, owner)?,
             forces: None,
-            keyframe: SliceReader::create(&services.keyframe, &KEYFRAME, owner)?,
-            particles: SliceReader::create(&services.particles, &PARTICLES, owner)?,
+            keyframe: Reader::create(&services.keyframe, &KEYFRAME, owner)?,
+            particles: Reader::create(&services.particles, &PARTICLES, owner)?,
             assembler: StateAssembler::default(),
             repeats: Repeats::default(),
             arrivals: Arrivals::default(),
@@ -176,7 +176,7 @@ impl Tap {
     /// [`Change::Forces`]: crate::Change::Forces
     pub fn read_forces(&mut self) -> Result<(), ServiceError> {
         let Attachment { services, source, .. } = &*self.attachment;
-        self.forces = Some(SliceReader::create(&services.forces, &FORCES, source)?);
+        self.forces = Some(Reader::create(&services.forces, &FORCES, source)?);
         Ok(())
     }
 
@@ -211,7 +211,7 @@ impl Tap {
 
     fn unless_repeated(
         &mut self,
-        sample: Option<SliceSample<ParticleState, SnapshotHeader>>,
+        sample: Option<Sample<ParticleState, SnapshotHeader>>,
     ) -> Option<Held> {
         sample.filter(|one| !self.repeats.is_repeated_snapshot(one.user_header())).map(Held::Shared)
     }
@@ -346,8 +346,8 @@ impl Tap {
             forces.drain(result, |header, rows| sink(Update::Forces(header, rows)));
         }
         self.keyframe.drain(result, |header, bytes| sink(Update::Keyframe(header, bytes)));
-        self.outcomes.drain(result, |outcome| sink(Update::Outcome(outcome)));
-        self.status.drain(result, |status| sink(Update::Status(status)));
+        self.outcomes.drain_values(result, |outcome| sink(Update::Outcome(outcome)));
+        self.status.drain_values(result, |status| sink(Update::Status(status)));
         drained
     }
 
@@ -374,8 +374,10 @@ mod tests {
     use crate::owner::load::Load;
     use crate::ports::domain;
     use crate::ports::domain::owner_lock::OwnerLock;
-    use crate::ports::session::{Access, Session, Slices};
+    use crate::ports::port::Service;
+    use crate::ports::session::{Access, Session};
     use crate::ports::source::Source;
+    use crate::ports::writer::{Capacity, Writer};
     use crate::testing::TestDomain;
 
     fn create_owner(endpoint: &Endpoint, run_id: u64) -> Owner {
@@ -402,13 +404,12 @@ mod tests {
         let mut tap = Tap::attach(&domain.endpoint()).unwrap();
         owner.refresh();
         let session = Session::join(&domain.endpoint()).unwrap();
-        let service: Slices<ParticleState, SnapshotHeader> =
-            session.slices(&PARTICLES, Access::Open).unwrap();
-        let stranger = service.publisher_builder().initial_max_slice_len(1).create().unwrap();
+        let service: Service<ParticleState, SnapshotHeader> =
+            session.service(&PARTICLES, Access::Open).unwrap();
+        let capacity = Capacity { len_max: 1, samples: 8 };
+        let stranger = Writer::create(session.config(), &service, capacity).unwrap();
         let intrude = |header: SnapshotHeader| {
-            let mut sample = stranger.loan_slice(1).unwrap();
-            *sample.user_header_mut() = header;
-            sample.send().unwrap();
+            stranger.send_elements(header, 1, |_| ParticleState::default()).unwrap();
         };
         publish(&owner, 7, 1);
         let run_of_the_owner = SnapshotHeader { run_id: 7, step: 50, ..SnapshotHeader::default() };

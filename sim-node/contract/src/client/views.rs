@@ -5,11 +5,11 @@ use sim_messages::{
     LoadHeader, ParameterValues, ParametersHeader, ParticleState, SnapshotHeader, Triangle,
 };
 
-use crate::ports::reader::SliceSample;
+use crate::ports::reader::Sample;
 
 /// A snapshot in shared memory: holding it keeps the memory from being reused.
 #[derive(Debug)]
-pub struct Snapshot(pub(crate) SliceSample<ParticleState, SnapshotHeader>);
+pub struct Snapshot(pub(crate) Sample<ParticleState, SnapshotHeader>);
 
 impl Snapshot {
     /// Returns the header.

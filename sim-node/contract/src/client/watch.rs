@@ -32,16 +32,31 @@ impl Watch {
         timeout: Duration,
         mut poll: impl FnMut() -> Result<Option<T>, ReadError>,
     ) -> Result<Option<T>, ReadError> {
+        let mut message = None;
+        self.wait_until(attachment, timeout, &mut || {
+            message = poll()?;
+            Ok(message.is_some())
+        })?;
+        Ok(message)
+    }
+
+    /// Same as [`Self::wait_for`], compiled once for all messages.
+    fn wait_until(
+        &mut self,
+        attachment: &Attachment,
+        timeout: Duration,
+        poll: &mut dyn FnMut() -> Result<bool, ReadError>,
+    ) -> Result<(), ReadError> {
         let deadline = Deadline::after(timeout);
         let mut silence = Deadline::after(SILENCE_MAX);
         loop {
-            if let Some(message) = poll()? {
+            if poll()? {
                 self.is_abandoned = false;
-                return Ok(Some(message));
+                return Ok(());
             }
             let remaining = deadline.remaining();
             if remaining.is_zero() {
-                return Ok(None);
+                return Ok(());
             }
             let Some(listener) = &self.listener else {
                 // Events before this connection are lost: poll again.
@@ -54,9 +69,8 @@ impl Watch {
                 WakeCause::Timeout | WakeCause::OwnerGone => {
                     silence = Deadline::after(SILENCE_MAX);
                     if !self.is_abandoned && attachment.owner().is_none() {
-                        let last = poll()?;
-                        self.is_abandoned = last.is_none();
-                        return Ok(last);
+                        self.is_abandoned = !poll()?;
+                        return Ok(());
                     }
                 }
             }

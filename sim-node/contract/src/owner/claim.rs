@@ -10,11 +10,12 @@ use crate::owner::error::OwnerError;
 use crate::ports::domain::owner_lock::{LockError, OwnerLock};
 use crate::ports::domain::root::RootError;
 use crate::ports::domain::{self, orphans, root, unfinished};
+use crate::ports::port::Service;
 use crate::ports::service::{OWNER_PORT, STATUS, ServiceError};
 use crate::ports::services::{OwnerProcess, living_process};
-use crate::ports::session::{Session, Values};
+use crate::ports::session::Session;
 use crate::ports::source::claiming_nodes;
-use crate::ports::writer::ValueWriter;
+use crate::ports::writer::{Capacity, Writer};
 
 /// Most attempts to take the lock of a name, in half a second: an owner that ends frees it a moment
 /// after its clients have noticed.
@@ -60,15 +61,15 @@ pub(super) fn take_lock(endpoint: &Endpoint) -> Result<OwnerLock, OwnerError> {
 /// taken by a killed owner, until a process has cleaned up after it; the other place is a tunnel's.
 pub(super) fn claim_name(
     session: &Session,
-    service: &Values<NodeStatus>,
-) -> Result<ValueWriter<NodeStatus>, OwnerError> {
-    let deadline = Deadline::after(CLEANUP_MAX);
+    service: &Service<NodeStatus>,
+) -> Result<Writer<NodeStatus>, OwnerError> {
+    let (deadline, capacity) = (Deadline::after(CLEANUP_MAX), Capacity::of_values(&STATUS));
     loop {
         if let Some(process) = owner(service) {
             let endpoint = session.endpoint.clone();
             return Err(OwnerError::NameTaken { endpoint, process_id: process.id });
         }
-        match ValueWriter::create_named(session.config(), service, &STATUS, OWNER_PORT) {
+        match Writer::create_named(session.config(), service, capacity, OWNER_PORT) {
             Err(ServiceError::Full { .. }) if !deadline.remaining().is_zero() => {
                 session.restore_orphans(&orphans::ports(service));
                 clock::sleep_until(clock::monotonic_ns() + LOCK_PAUSE_NS);
@@ -79,7 +80,7 @@ pub(super) fn claim_name(
 }
 
 /// Returns the living process that calls itself the owner.
-fn owner(status: &Values<NodeStatus>) -> Option<OwnerProcess> {
+fn owner(status: &Service<NodeStatus>) -> Option<OwnerProcess> {
     living_process(status, &claiming_nodes(status))
 }
 
@@ -90,7 +91,7 @@ mod tests {
     use super::*;
     use crate::owner::Owner;
     use crate::owner::load::Load;
-    use crate::ports::reader::subscribe;
+    use crate::ports::reader::Reader;
     use crate::ports::service::{COMMANDS, READY, RESTORE};
     use crate::ports::services::Services;
     use crate::ports::session::Access;
@@ -103,9 +104,9 @@ mod tests {
     }
 
     /// A tunnel's publisher of `status`.
-    fn tunnel(session: &Session) -> ValueWriter<NodeStatus> {
-        let service = session.values(&STATUS, Access::Open).unwrap();
-        ValueWriter::create(session.config(), &service, &STATUS).unwrap()
+    fn tunnel(session: &Session) -> Writer<NodeStatus> {
+        let service = session.service(&STATUS, Access::Open).unwrap();
+        Writer::of_values(session.config(), &service, &STATUS).unwrap()
     }
 
     #[test]
@@ -126,17 +127,17 @@ mod tests {
         let domain = TestDomain::new();
         let endpoint = domain.endpoint();
         let session = Session::join(&endpoint).unwrap();
-        let status = session.values(&STATUS, Access::Create).unwrap();
+        let status = session.service(&STATUS, Access::Create).unwrap();
         let _status = claim_name(&session, &status).unwrap();
         // As within `Owner::create`, between the services and the ports.
         let services = Services::access(&session, Access::Create).unwrap();
         let error = Client::attach(&endpoint).unwrap_err();
         assert!(matches!(error, AttachError::NoNode { .. }), "{error}");
-        let _ready = subscribe(&services.ready, &READY).unwrap();
-        let _restore = subscribe(&services.restore, &RESTORE).unwrap();
+        let _ready = Reader::of_every_publisher(&services.ready, &READY).unwrap();
+        let _restore = Reader::of_every_publisher(&services.restore, &RESTORE).unwrap();
         std::thread::scope(|scope| {
             let client = scope.spawn(|| Client::attach(&endpoint).map(drop));
-            let _commands = subscribe(&services.commands, &COMMANDS).unwrap();
+            let _commands = Reader::of_every_publisher(&services.commands, &COMMANDS).unwrap();
             client.join().unwrap().unwrap();
         });
     }
@@ -146,7 +147,7 @@ mod tests {
         let domain = TestDomain::new();
         let first = create_owner(&domain.endpoint()).unwrap();
         let session = Session::join(&domain.endpoint()).unwrap();
-        let status = session.values(&STATUS, Access::Open).unwrap();
+        let status = session.service(&STATUS, Access::Open).unwrap();
         let _tunnel = tunnel(&session);
         assert!(owner(&status).is_some());
         drop(first);

@@ -7,7 +7,7 @@ use crate::owner::error::OwnerError;
 use crate::ports::connection;
 use crate::ports::port::reader_count;
 use crate::ports::service::{FORCES, ServiceError};
-use crate::ports::writer::{Capacity, SliceWriter};
+use crate::ports::writer::{Capacity, Writer};
 
 impl Owner {
     /// Returns the number of readers of `forces`, counted like [`Owner::reader_count`]. Cheap.
@@ -43,10 +43,10 @@ impl Owner {
     fn create_forces_writer(
         &self,
         row_count: usize,
-    ) -> Result<SliceWriter<ForceRow, ForcesHeader>, ServiceError> {
+    ) -> Result<Writer<ForceRow, ForcesHeader>, ServiceError> {
         let len_max = row_count.next_power_of_two();
         let capacity = Capacity { len_max, samples: FORCES.samples_in_use_max() };
-        SliceWriter::create(&self.services.config, &self.services.forces, capacity)
+        Writer::create(&self.services.config, &self.services.forces, capacity)
     }
 
     /// Frees the memory of the forces, so that a later reader receives no old ones.

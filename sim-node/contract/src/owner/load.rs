@@ -18,7 +18,7 @@ use crate::ports::service::{
 };
 use crate::ports::services::Services;
 use crate::ports::writer::PublishError;
-use crate::ports::writer::{Capacity, SliceWriter};
+use crate::ports::writer::{Capacity, Writer};
 
 /// A load: the data that an owner publishes once, and the sizes of its later messages.
 #[derive(Debug, Clone, Default)]
@@ -51,19 +51,19 @@ impl Load<'_> {
 /// The writers of a load.
 #[derive(Debug)]
 pub(crate) struct LoadWriters {
-    pub(crate) particles: SliceWriter<ParticleState, SnapshotHeader>,
-    pub(crate) keyframe: SliceWriter<u8, KeyframeHeader>,
+    pub(crate) particles: Writer<ParticleState, SnapshotHeader>,
+    pub(crate) keyframe: Writer<u8, KeyframeHeader>,
     // These four publish only the load, so they have memory for one message of exactly its length. New
     // writers replace them when they publish it again.
-    pub(super) scene: RefCell<SliceWriter<u8, LoadHeader>>,
-    pub(super) topology: RefCell<SliceWriter<ConstraintState, LoadHeader>>,
-    pub(super) bends: RefCell<SliceWriter<BendState, LoadHeader>>,
-    pub(super) surface: RefCell<SliceWriter<Triangle, LoadHeader>>,
-    pub(super) tears: SliceWriter<TornConstraint, TearsHeader>,
-    pub(super) parameters: SliceWriter<ParameterState, ParametersHeader>,
-    pub(super) colliders: SliceWriter<ColliderState, CollidersHeader>,
+    pub(super) scene: RefCell<Writer<u8, LoadHeader>>,
+    pub(super) topology: RefCell<Writer<ConstraintState, LoadHeader>>,
+    pub(super) bends: RefCell<Writer<BendState, LoadHeader>>,
+    pub(super) surface: RefCell<Writer<Triangle, LoadHeader>>,
+    pub(super) tears: Writer<TornConstraint, TearsHeader>,
+    pub(super) parameters: Writer<ParameterState, ParametersHeader>,
+    pub(super) colliders: Writer<ColliderState, CollidersHeader>,
     /// Only while a client reads the forces.
-    pub(super) forces: RefCell<Option<SliceWriter<ForceRow, ForcesHeader>>>,
+    pub(super) forces: RefCell<Option<Writer<ForceRow, ForcesHeader>>>,
 }
 
 /// Memory of the writers of a load.
@@ -116,23 +116,19 @@ impl LoadWriters {
         let capacities = Capacities::of(load);
         let config = &services.config;
         Ok(Self {
-            particles: SliceWriter::create(config, &services.particles, capacities.particles)?,
-            keyframe: SliceWriter::create(config, &services.keyframe, capacities.keyframe)?,
-            scene: RefCell::new(SliceWriter::create(config, &services.scene, capacities.scene)?),
-            topology: RefCell::new(SliceWriter::create(
+            particles: Writer::create(config, &services.particles, capacities.particles)?,
+            keyframe: Writer::create(config, &services.keyframe, capacities.keyframe)?,
+            scene: RefCell::new(Writer::create(config, &services.scene, capacities.scene)?),
+            topology: RefCell::new(Writer::create(
                 config,
                 &services.topology,
                 capacities.topology,
             )?),
-            bends: RefCell::new(SliceWriter::create(config, &services.bends, capacities.bends)?),
-            surface: RefCell::new(SliceWriter::create(
-                config,
-                &services.surface,
-                capacities.surface,
-            )?),
-            tears: SliceWriter::create(config, &services.tears, capacities.tears)?,
-            parameters: SliceWriter::create(config, &services.parameters, capacities.parameters)?,
-            colliders: SliceWriter::create(config, &services.colliders, capacities.colliders)?,
+            bends: RefCell::new(Writer::create(config, &services.bends, capacities.bends)?),
+            surface: RefCell::new(Writer::create(config, &services.surface, capacities.surface)?),
+            tears: Writer::create(config, &services.tears, capacities.tears)?,
+            parameters: Writer::create(config, &services.parameters, capacities.parameters)?,
+            colliders: Writer::create(config, &services.colliders, capacities.colliders)?,
             forces: RefCell::new(None),
         })
     }
@@ -150,7 +146,7 @@ impl LoadWriters {
             self.parameters.close(),
             self.colliders.close(),
         ];
-        always.into_iter().chain(self.forces.into_inner().map(SliceWriter::close)).collect()
+        always.into_iter().chain(self.forces.into_inner().map(Writer::close)).collect()
     }
 
     /// Returns the size of the longest state of the load: its particles and a keyframe.
@@ -219,7 +215,7 @@ impl LoadWriters {
         self.colliders.refresh();
         self.tears.refresh();
         self.parameters.refresh();
-        self.forces.borrow().iter().for_each(SliceWriter::refresh);
+        self.forces.borrow().iter().for_each(Writer::refresh);
         self.keyframe.refresh();
         self.particles.refresh();
     }

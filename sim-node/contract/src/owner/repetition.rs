@@ -5,20 +5,19 @@
 
 use std::cell::{Cell, RefCell};
 use std::error::Error;
-use std::fmt::Debug;
 
+use bytemuck::Pod;
 use iceoryx2::prelude::{Config, ZeroCopySend};
 
 use crate::owner::load::LoadWriters;
-use crate::ports::port::SliceHeader;
-use crate::ports::reader::{ReadError, SliceReader, SliceSample};
+use crate::ports::port::{Header, Service};
+use crate::ports::reader::{ReadError, Reader, Sample};
 use crate::ports::service::{
     BENDS, COLLIDERS, FORCES, KEYFRAME, PARAMETERS, PARTICLES, SCENE, SURFACE, ServiceSpec, TEARS,
     TOPOLOGY,
 };
 use crate::ports::services::Services;
-use crate::ports::session::Slices;
-use crate::ports::writer::SliceWriter;
+use crate::ports::writer::Writer;
 
 /// Messages of a repetition, in the order of publication: one at a time, because each costs the loop a part
 /// of a millisecond, and longer if it is large.
@@ -87,13 +86,13 @@ impl Repetition {
 
 /// Publishes the latched message again with its writer, which has memory for several messages.
 fn repeat<T, H>(
-    writer: &SliceWriter<T, H>,
-    service: &Slices<T, H>,
+    writer: &Writer<T, H>,
+    service: &Service<T, H>,
     spec: &ServiceSpec,
 ) -> Result<(), Box<dyn Error>>
 where
-    T: Debug + Copy + ZeroCopySend + 'static,
-    H: SliceHeader,
+    T: Pod + ZeroCopySend,
+    H: Header,
 {
     if let Some(message) = latched(writer, service, spec)? {
         let elements = message.payload();
@@ -105,19 +104,19 @@ where
 /// Publishes the latched message again with a new writer, because a reader may hold the only message of the
 /// old one for as long as it likes.
 fn replace<T, H>(
-    writer: &RefCell<SliceWriter<T, H>>,
+    writer: &RefCell<Writer<T, H>>,
     config: &Config,
-    service: &Slices<T, H>,
+    service: &Service<T, H>,
     spec: &ServiceSpec,
 ) -> Result<(), Box<dyn Error>>
 where
-    T: Debug + Copy + ZeroCopySend + 'static,
-    H: SliceHeader,
+    T: Pod + ZeroCopySend,
+    H: Header,
 {
     let mut writer = writer.borrow_mut();
     if let Some(message) = latched(&writer, service, spec)? {
         let elements = message.payload();
-        let new = SliceWriter::create(config, service, writer.capacity())?;
+        let new = Writer::create(config, service, writer.capacity())?;
         new.write(*message.user_header(), |index| elements[index])?;
         *writer = new;
     }
@@ -126,15 +125,15 @@ where
 
 /// Reads the latched message of a writer as a late reader does.
 fn latched<T, H>(
-    writer: &SliceWriter<T, H>,
-    service: &Slices<T, H>,
+    writer: &Writer<T, H>,
+    service: &Service<T, H>,
     spec: &ServiceSpec,
-) -> Result<Option<SliceSample<T, H>>, ReadError>
+) -> Result<Option<Sample<T, H>>, ReadError>
 where
-    T: Debug + Copy + ZeroCopySend + 'static,
-    H: SliceHeader,
+    T: Pod + ZeroCopySend,
+    H: Header,
 {
-    let reader = SliceReader::of_every_publisher(service, spec)?;
+    let reader = Reader::of_every_publisher(service, spec)?;
     writer.refresh();
     reader.newest()
 }
@@ -148,11 +147,11 @@ mod tests {
     use crate::client::tap::Tap;
     use crate::owner::Owner;
     use crate::owner::load::Load;
-    use crate::ports::reader::SliceReader;
+    use crate::ports::reader::Reader;
     use crate::ports::service::{BENDS, READY, SCENE, SURFACE, TEARS, TOPOLOGY};
     use crate::ports::services::Services;
     use crate::ports::session::{Access, Session};
-    use crate::ports::writer::ValueWriter;
+    use crate::ports::writer::Writer;
     use crate::testing::TestDomain;
 
     const BENT: BendState = BendState {
@@ -204,11 +203,11 @@ mod tests {
         // Readers that have received everything, like a tunnel that is there first.
         let session = Session::join(&domain.endpoint()).unwrap();
         let services = Services::access(&session, Access::Open).unwrap();
-        let scene = SliceReader::of_every_publisher(&services.scene, &SCENE).unwrap();
-        let topology = SliceReader::of_every_publisher(&services.topology, &TOPOLOGY).unwrap();
-        let bends = SliceReader::of_every_publisher(&services.bends, &BENDS).unwrap();
-        let surface = SliceReader::of_every_publisher(&services.surface, &SURFACE).unwrap();
-        let tears = SliceReader::of_every_publisher(&services.tears, &TEARS).unwrap();
+        let scene = Reader::of_every_publisher(&services.scene, &SCENE).unwrap();
+        let topology = Reader::of_every_publisher(&services.topology, &TOPOLOGY).unwrap();
+        let bends = Reader::of_every_publisher(&services.bends, &BENDS).unwrap();
+        let surface = Reader::of_every_publisher(&services.surface, &SURFACE).unwrap();
+        let tears = Reader::of_every_publisher(&services.tears, &TEARS).unwrap();
         refresh_all(&owner);
         let first = topology.next().unwrap().unwrap();
         for is_none in [
@@ -222,9 +221,9 @@ mod tests {
         refresh_all(&owner);
         assert!(topology.next().unwrap().is_none(), "nothing without a request");
 
-        let requests = ValueWriter::create(&services.config, &services.ready, &READY).unwrap();
+        let requests = Writer::of_values(&services.config, &services.ready, &READY).unwrap();
         for _ in 0..3 {
-            requests.write(Ready { tag: Ready::REPEAT_TAG, ..Ready::default() }).unwrap();
+            requests.send_value(Ready { tag: Ready::REPEAT_TAG, ..Ready::default() }).unwrap();
             owner.receive_ready(|_, _| panic!("a request joins nothing"));
             refresh_all(&owner);
             assert_eq!(scene.next().unwrap().unwrap().payload(), LOAD.scene);

@@ -1,17 +1,15 @@
 //! The connections through which the messages of clients arrive.
 
 use std::collections::BTreeMap;
-use std::fmt::Debug;
 
+use bytemuck::Pod;
 use iceoryx2::identifiers::UniqueNodeId;
-use iceoryx2::port::subscriber::Subscriber;
-use iceoryx2::prelude::{
-    CallbackProgression, NodeState, PortFactory, ZeroCopySend, ipc_threadsafe,
-};
+use iceoryx2::prelude::{CallbackProgression, NodeState, PortFactory, ZeroCopySend};
 use sim_messages::{BORROWED_UPDATES_MAX, Command};
 
-use crate::ports::port::SliceHeader;
-use crate::ports::session::{Slices, Values};
+use crate::ports::port::Header;
+use crate::ports::raw;
+use crate::ports::reader::Reader;
 
 /// A connection of a client: its publisher of commands or of a member's messages. A client that
 /// connects again has another one, even under the same client id.
@@ -30,8 +28,8 @@ pub struct ReceivedCommand {
 /// Receives the messages that have arrived, those of each connection in the order of sending, and at
 /// most one queue of `buffered` messages of each, so that a client that sends without a pause keeps no
 /// other waiting. Ends early at a client with a broken connection.
-pub(crate) fn receive_round<T: Copy + Debug + ZeroCopySend>(
-    subscriber: &Subscriber<ipc_threadsafe::Service, T, ()>,
+pub(crate) fn receive_round<T: Pod + ZeroCopySend>(
+    reader: &Reader<T>,
     buffered: usize,
     mut add: impl FnMut(T, ConnectionId),
 ) {
@@ -39,9 +37,11 @@ pub(crate) fn receive_round<T: Copy + Debug + ZeroCopySend>(
     // A subscriber skips the connections of which it holds the most samples that it may. Holding the
     // last ones of a queue is the only way to reach the connections behind it.
     let mut held = Vec::new();
-    while let Ok(Some(sample)) = subscriber.receive() {
-        let connection = ConnectionId(sample.origin().value());
-        add(*sample, connection);
+    while let Ok(Some(sample)) = reader.receive() {
+        let connection = ConnectionId(sample.origin());
+        if let Some(value) = sample.payload().first() {
+            add(*value, connection);
+        }
         let count = counts.entry(connection).or_insert(0);
         *count += 1;
         if *count > buffered - BORROWED_UPDATES_MAX {
@@ -52,31 +52,25 @@ pub(crate) fn receive_round<T: Copy + Debug + ZeroCopySend>(
 
 /// Receives messages with a payload, at most `count_max`, and of each connection at most as many as a
 /// reader may hold. Ends early at a client with a broken connection.
-pub(crate) fn receive_held<H: Debug + ZeroCopySend>(
-    subscriber: &Subscriber<ipc_threadsafe::Service, [u8], H>,
+pub(crate) fn receive_held<H: Header>(
+    reader: &Reader<u8, H>,
     count_max: usize,
     mut add: impl FnMut(&H, &[u8], ConnectionId),
 ) {
     // As above, holding the messages is the way to reach every connection.
     let mut held = Vec::new();
     while held.len() < count_max
-        && let Ok(Some(sample)) = subscriber.receive()
+        && let Ok(Some(sample)) = reader.receive()
     {
-        let connection = ConnectionId(sample.origin().value());
-        add(sample.user_header(), sample.payload(), connection);
+        add(sample.user_header(), sample.payload(), ConnectionId(sample.origin()));
         held.push(sample);
     }
 }
 
 /// Returns the connections of a service. Those of killed clients count until somebody cleans up. It
 /// reads shared memory only.
-pub(crate) fn listed<T: Debug + ZeroCopySend>(service: &Values<T>) -> Vec<ConnectionId> {
-    let mut connections = Vec::new();
-    service.dynamic_config().list_publishers(|publisher| {
-        connections.push(ConnectionId(publisher.publisher_id.value()));
-        CallbackProgression::Continue
-    });
-    connections
+pub(crate) fn listed(service: &raw::Service) -> Vec<ConnectionId> {
+    publishers(service).into_iter().map(|(_, connection)| connection).collect()
 }
 
 /// Returns the connections whose clients are alive.
@@ -84,23 +78,24 @@ pub(crate) fn listed<T: Debug + ZeroCopySend>(service: &Values<T>) -> Vec<Connec
 /// A client that closes its connection removes the publisher. A killed one leaves it behind until a
 /// process cleans up, so the state of each publisher's node decides. A node whose state cannot be
 /// read counts as alive: no grab must end by mistake.
-pub(crate) fn living<T: Debug + ZeroCopySend>(service: &Values<T>) -> Vec<ConnectionId> {
-    let mut publishers = Vec::new();
-    service.dynamic_config().list_publishers(|publisher| {
-        publishers.push((publisher.node_id, ConnectionId(publisher.publisher_id.value())));
-        CallbackProgression::Continue
-    });
+pub(crate) fn living(service: &raw::Service) -> Vec<ConnectionId> {
+    let mut publishers = publishers(service);
     let dead = dead_nodes(service);
     publishers.retain(|(node, _)| !dead.contains(node));
     publishers.into_iter().map(|(_, connection)| connection).collect()
 }
 
+fn publishers(service: &raw::Service) -> Vec<(UniqueNodeId, ConnectionId)> {
+    let mut publishers = Vec::new();
+    service.dynamic_config().list_publishers(|publisher| {
+        publishers.push((publisher.node_id, ConnectionId(publisher.publisher_id.value())));
+        CallbackProgression::Continue
+    });
+    publishers
+}
+
 /// Returns `true` if a reader of a service is alive, in the same sense.
-pub(crate) fn has_living_reader<T, H>(service: &Slices<T, H>) -> bool
-where
-    T: Debug + ZeroCopySend + 'static,
-    H: SliceHeader,
-{
+pub(crate) fn has_living_reader(service: &raw::Service) -> bool {
     let mut readers = Vec::new();
     service.dynamic_config().list_subscribers(|subscriber| {
         readers.push(subscriber.node_id);
@@ -111,7 +106,7 @@ where
 }
 
 /// After an error, the nodes that were not listed count as alive.
-fn dead_nodes(service: &impl PortFactory<Service = ipc_threadsafe::Service>) -> Vec<UniqueNodeId> {
+fn dead_nodes(service: &raw::Service) -> Vec<UniqueNodeId> {
     let mut dead = Vec::new();
     let _ = service.nodes(|node| {
         if let NodeState::Dead(_) = node {

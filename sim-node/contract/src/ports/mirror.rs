@@ -14,10 +14,11 @@ use sim_messages::{
     SnapshotHeader,
 };
 
-use crate::ports::reader::ValueReader;
+use crate::ports::port::Service;
+use crate::ports::reader::Reader;
 use crate::ports::service::{PARTICLES, READY, STATUS, ServiceError};
-use crate::ports::session::{Session, Slices, Values};
-use crate::ports::writer::ValueWriter;
+use crate::ports::session::Session;
+use crate::ports::writer::Writer;
 
 /// Longest wait for the first status, which comes ten times a second.
 const FIRST_STATUS_MAX: Duration = Duration::from_secs(3);
@@ -27,9 +28,9 @@ const REQUEST_PERIOD_NS: u64 = SECOND_NS;
 /// A connection to the owner behind a tunnel.
 #[derive(Debug)]
 pub(crate) struct Mirror {
-    status: ValueReader<NodeStatus>,
+    status: Reader<NodeStatus>,
     /// Kept for the life of the client: a request that the tunnel has not read vanishes with its writer.
-    requests: ValueWriter<Ready>,
+    requests: Writer<Ready>,
     /// CLOCK_MONOTONIC of the last received status.
     heard_ns: AtomicU64,
     /// CLOCK_MONOTONIC from which on another request may be sent.
@@ -40,20 +41,20 @@ impl Mirror {
     /// Connects, and waits for a status. Returns `None` if none arrives: there is no owner behind the tunnel.
     pub(crate) fn connect(
         session: &Session,
-        status: &Values<NodeStatus>,
-        particles: &Slices<ParticleState, SnapshotHeader>,
-        ready: &Values<Ready>,
+        status: &Service<NodeStatus>,
+        particles: &Service<ParticleState, SnapshotHeader>,
+        ready: &Service<Ready>,
     ) -> Result<Option<Self>, ServiceError> {
         check_quality(particles)?;
         let mirror = Self {
-            status: ValueReader::of_every_publisher(status, &STATUS)?,
-            requests: ValueWriter::create(session.config(), ready, &READY)?,
+            status: Reader::of_every_publisher(status, &STATUS)?,
+            requests: Writer::of_values(session.config(), ready, &READY)?,
             heard_ns: AtomicU64::new(0),
             next_request_ns: AtomicU64::new(0),
         };
         let deadline = Deadline::after(FIRST_STATUS_MAX);
         while !deadline.remaining().is_zero() {
-            if let Ok(Some(first)) = mirror.status.newest() {
+            if let Ok(Some(first)) = mirror.status.newest_value() {
                 mirror.heard_ns.store(monotonic_ns(), Ordering::Relaxed);
                 return check_version(session, &first).map(|()| Some(mirror));
             }
@@ -66,7 +67,7 @@ impl Mirror {
     pub(crate) fn is_owner_alive(&self) -> bool {
         let now_ns = monotonic_ns();
         // A broken connection is silence.
-        if matches!(self.status.newest(), Ok(Some(_))) {
+        if matches!(self.status.newest_value(), Ok(Some(_))) {
             self.heard_ns.store(now_ns, Ordering::Relaxed);
         }
         let silence_ns = now_ns.saturating_sub(self.heard_ns.load(Ordering::Relaxed));
@@ -81,7 +82,7 @@ impl Mirror {
         }
         self.next_request_ns.store(now_ns + REQUEST_PERIOD_NS, Ordering::Relaxed);
         // Without memory for it, the next request may succeed.
-        let _ = self.requests.write(Ready { tag: Ready::REPEAT_TAG, ..Ready::default() });
+        let _ = self.requests.send_value(Ready { tag: Ready::REPEAT_TAG, ..Ready::default() });
     }
 }
 
@@ -95,7 +96,7 @@ fn check_version(session: &Session, status: &NodeStatus) -> Result<(), ServiceEr
 }
 
 /// Checks the quality of service of one mirror. A tunnel creates all with the defaults of its configuration.
-fn check_quality(particles: &Slices<ParticleState, SnapshotHeader>) -> Result<(), ServiceError> {
+fn check_quality(particles: &Service<ParticleState, SnapshotHeader>) -> Result<(), ServiceError> {
     let quality = particles.static_config();
     let qualities = [
         ("buffered messages", quality.subscriber_max_buffer_size(), MIRROR_BUFFERED_MIN),
@@ -126,18 +127,18 @@ mod tests {
 
     /// Services as a tunnel creates them, with the status of a node of a contract version.
     struct Tunnel {
-        status: ValueWriter<NodeStatus>,
+        status: Writer<NodeStatus>,
         _services: Services,
-        _status_service: Values<NodeStatus>,
+        _status_service: Service<NodeStatus>,
         _session: Session,
     }
 
     impl Tunnel {
         fn create(domain: &TestDomain) -> Self {
             let session = Session::join_without_version(&domain.endpoint()).unwrap();
-            let service = session.values(&STATUS, Access::Create).unwrap();
+            let service = session.service(&STATUS, Access::Create).unwrap();
             Self {
-                status: ValueWriter::create(session.config(), &service, &STATUS).unwrap(),
+                status: Writer::of_values(session.config(), &service, &STATUS).unwrap(),
                 _services: Services::access(&session, Access::Create).unwrap(),
                 _status_service: service,
                 _session: session,
@@ -155,7 +156,7 @@ mod tests {
                 });
                 let status = NodeStatus { contract_version: version, ..NodeStatus::default() };
                 while !is_over.load(Ordering::Relaxed) {
-                    self.status.write(status).unwrap();
+                    self.status.send_value(status).unwrap();
                     thread::yield_now();
                 }
                 attaching.join().unwrap()
@@ -199,7 +200,7 @@ mod tests {
         let domain = TestDomain::new();
         let session = Session::join_without_version(&domain.endpoint()).unwrap();
         let poor = ServiceSpec { buffered: 2, ..PARTICLES };
-        let particles = session.slices(&poor, Access::Create).unwrap();
+        let particles = session.service(&poor, Access::Create).unwrap();
         let text = check_quality(&particles).unwrap_err().to_string();
         assert_eq!(
             text,
@@ -214,7 +215,7 @@ mod tests {
         let domain = TestDomain::new();
         let _tunnel = Tunnel::create(&domain);
         let session = Session::join(&domain.endpoint()).unwrap();
-        let error = session.values::<NodeStatus>(&STATUS, Access::Create).unwrap_err();
+        let error = session.service::<NodeStatus, ()>(&STATUS, Access::Create).unwrap_err();
         assert!(matches!(error, ServiceError::Incompatible { .. }), "{error}");
     }
 }

@@ -1,9 +1,12 @@
 //! Common parts of readers, writers and listeners.
 
 use std::fmt::Debug;
+use std::marker::PhantomData;
+use std::ops::Deref;
 
-use iceoryx2::prelude::{IceoryxSend, PortFactory, ZeroCopySend, ipc_threadsafe};
-use iceoryx2::service::port_factory::publish_subscribe;
+use bytemuck::Pod;
+use iceoryx2::prelude::{PortFactory, ZeroCopySend, ipc_threadsafe};
+use iceoryx2::service::static_config::message_type_details::TypeVariant;
 use sim_messages::{
     CollidersHeader, ForcesHeader, KeyframeHeader, LoadHeader, ParametersHeader, RestoreHeader,
     SnapshotHeader, TearsHeader,
@@ -11,69 +14,73 @@ use sim_messages::{
 
 use crate::ports::cleanup;
 use crate::ports::memory;
+use crate::ports::raw::{self, MessageType};
 use crate::ports::service::ServiceError;
 
-/// A header that contains the length of its payload.
-pub(crate) trait SliceHeader: Debug + Default + Copy + ZeroCopySend {
+/// A header that contains the length of its payload. `()` is the header of single values.
+pub(crate) trait Header: Pod + ZeroCopySend {
+    const VARIANT: TypeVariant = TypeVariant::Dynamic;
+
     fn element_count(&self) -> u64;
 }
 
-impl SliceHeader for SnapshotHeader {
+impl Header for () {
+    const VARIANT: TypeVariant = TypeVariant::FixedSize;
+
     fn element_count(&self) -> u64 {
-        self.particle_count.into()
+        1
     }
 }
 
-impl SliceHeader for LoadHeader {
-    fn element_count(&self) -> u64 {
-        self.count.into()
+macro_rules! headers {
+    ($($header:ident: $count:ident),+ $(,)?) => {
+        $(impl Header for $header {
+            fn element_count(&self) -> u64 {
+                self.$count.into()
+            }
+        })+
+    };
+}
+
+headers! {
+    SnapshotHeader: particle_count,
+    LoadHeader: count,
+    TearsHeader: count,
+    CollidersHeader: count,
+    ForcesHeader: count,
+    ParametersHeader: count,
+    KeyframeHeader: size_bytes,
+    RestoreHeader: size_bytes,
+}
+
+/// A publish-subscribe service whose messages are slices of `T` with the header `H`, or single values.
+#[derive(Debug)]
+pub(crate) struct Service<T, H = ()> {
+    raw: raw::Service,
+    _types: PhantomData<fn() -> (T, H)>,
+}
+
+impl<T: Pod + ZeroCopySend, H: Header> Service<T, H> {
+    pub(crate) fn message_type() -> MessageType {
+        MessageType::of::<T, H>(H::VARIANT)
+    }
+
+    /// Adds the types to a service of [`Self::message_type`].
+    pub(crate) fn of(raw: raw::Service) -> Self {
+        Self { raw, _types: PhantomData }
     }
 }
 
-impl SliceHeader for TearsHeader {
-    fn element_count(&self) -> u64 {
-        self.count.into()
-    }
-}
+impl<T, H> Deref for Service<T, H> {
+    type Target = raw::Service;
 
-impl SliceHeader for CollidersHeader {
-    fn element_count(&self) -> u64 {
-        self.count.into()
-    }
-}
-
-impl SliceHeader for ForcesHeader {
-    fn element_count(&self) -> u64 {
-        self.count.into()
-    }
-}
-
-impl SliceHeader for ParametersHeader {
-    fn element_count(&self) -> u64 {
-        self.count.into()
-    }
-}
-
-impl SliceHeader for KeyframeHeader {
-    fn element_count(&self) -> u64 {
-        self.size_bytes
-    }
-}
-
-impl SliceHeader for RestoreHeader {
-    fn element_count(&self) -> u64 {
-        self.size_bytes
+    fn deref(&self) -> &raw::Service {
+        &self.raw
     }
 }
 
 /// Returns the number of readers of a service. Killed readers count until their ports are freed.
-pub(crate) fn reader_count<P, H>(
-    service: &publish_subscribe::PortFactory<ipc_threadsafe::Service, P, H>,
-) -> usize
-where
-    P: Debug + IceoryxSend + ?Sized,
-    H: Debug + ZeroCopySend,
-{
+pub(crate) fn reader_count(service: &raw::Service) -> usize {
     service.dynamic_config().number_of_subscribers()
 }
 

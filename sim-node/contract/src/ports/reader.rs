@@ -1,20 +1,17 @@
 //! Readers of the publish-subscribe services. They check each message.
 
-use std::fmt::Debug;
+use std::marker::PhantomData;
 use std::sync::Arc;
 
+use bytemuck::{Pod, cast_slice, from_bytes};
 use iceoryx2::port::ReceiveError;
-use iceoryx2::port::subscriber::{Subscriber, SubscriberCreateError};
-use iceoryx2::prelude::{IceoryxSend, PortFactory, ZeroCopySend, ipc_threadsafe};
-use iceoryx2::sample::Sample;
-use iceoryx2::service::header::payload_header::PayloadHeader;
-use iceoryx2::service::port_factory::publish_subscribe;
-use sim_messages::BORROWED_UPDATES_MAX;
+use iceoryx2::port::subscriber::SubscriberCreateError;
+use iceoryx2::prelude::{PortFactory, ZeroCopySend};
 use thiserror::Error;
 
-use crate::ports::port::{PortLimit, SliceHeader, create_port};
+use crate::ports::port::{Header, PortLimit, Service, create_port};
+use crate::ports::raw::{self, Subscriber};
 use crate::ports::service::{ServiceError, ServiceSpec};
-use crate::ports::session::{Slices, Values};
 use crate::ports::source::Source;
 
 /// Most refused messages to skip in one read, so that another process cannot keep a reader from
@@ -55,13 +52,39 @@ pub(crate) struct Drained {
     pub(crate) errors: Vec<ReadError>,
 }
 
-/// A message in shared memory whose header agrees with its payload.
-pub(crate) type SliceSample<T, H> = Sample<ipc_threadsafe::Service, [T], H>;
-
-/// A reader of a service of slices.
+/// A message in shared memory: a payload of `T`s and the header `H`.
 #[derive(Debug)]
-pub(crate) struct SliceReader<T: Debug + ZeroCopySend + 'static, H: SliceHeader> {
-    subscriber: Subscriber<ipc_threadsafe::Service, [T], H>,
+pub(crate) struct Sample<T, H = ()> {
+    raw: raw::Sample,
+    _types: PhantomData<fn() -> (T, H)>,
+}
+
+impl<T: Pod, H: Pod> Sample<T, H> {
+    pub(crate) fn payload(&self) -> &[T] {
+        cast_slice(self.raw.payload())
+    }
+
+    pub(crate) fn user_header(&self) -> &H {
+        from_bytes(self.raw.header())
+    }
+
+    /// Returns the number of the publisher.
+    pub(crate) fn origin(&self) -> u128 {
+        self.raw.origin().value()
+    }
+}
+
+/// A reader of messages with a payload of `T`s and the header `H`.
+#[derive(Debug)]
+pub(crate) struct Reader<T, H = ()> {
+    port: Port,
+    _types: PhantomData<fn() -> (T, H)>,
+}
+
+/// A reader of any messages.
+#[derive(Debug)]
+struct Port {
+    subscriber: Subscriber,
     service: String,
     buffered: usize,
     borrowed: usize,
@@ -69,45 +92,38 @@ pub(crate) struct SliceReader<T: Debug + ZeroCopySend + 'static, H: SliceHeader>
     source: Option<Arc<Source>>,
 }
 
-impl<T: Debug + ZeroCopySend + 'static, H: SliceHeader> SliceReader<T, H> {
+impl<T: Pod + ZeroCopySend, H: Header> Reader<T, H> {
     /// Reads the messages of the owner, and drops the messages of other publishers without a trace.
     pub(crate) fn create(
-        service: &Slices<T, H>,
+        service: &Service<T, H>,
         spec: &ServiceSpec,
         owner: &Arc<Source>,
     ) -> Result<Self, ServiceError> {
-        let reader = Self::of_every_publisher(service, spec)?;
-        Ok(Self { source: Some(Arc::clone(owner)), ..reader })
+        let port = Port::create(service, spec, Some(Arc::clone(owner)))?;
+        Ok(Self { port, _types: PhantomData })
     }
 
     pub(crate) fn of_every_publisher(
-        service: &Slices<T, H>,
+        service: &Service<T, H>,
         spec: &ServiceSpec,
     ) -> Result<Self, ServiceError> {
-        let subscriber = subscribe(service, spec)?;
-        let service = service.name().to_string();
-        let ServiceSpec { buffered, borrowed, .. } = *spec;
-        Ok(Self { subscriber, service, buffered, borrowed, source: None })
+        Ok(Self { port: Port::create(service, spec, None)?, _types: PhantomData })
+    }
+
+    /// Returns the next message, even if its header disagrees with its payload; `None` if all were read.
+    pub(crate) fn receive(&self) -> Result<Option<Sample<T, H>>, ReadError> {
+        Ok(self.port.receive()?.map(|raw| Sample { raw, _types: PhantomData }))
     }
 
     /// Returns the next message; `None` if all were read.
-    pub(crate) fn next(&self) -> Result<Option<SliceSample<T, H>>, ReadError> {
-        let received = next_accepted(self.source.as_deref(), || self.subscriber.receive());
-        let Some(sample) =
-            received.map_err(|error| read_error(&self.service, self.borrowed, error))?
-        else {
-            return Ok(None);
-        };
+    pub(crate) fn next(&self) -> Result<Option<Sample<T, H>>, ReadError> {
+        let Some(sample) = self.receive()? else { return Ok(None) };
         let (len, count) = (sample.payload().len(), sample.user_header().element_count());
-        if len as u64 == count {
-            return Ok(Some(sample));
-        }
-        let detail = format!("its header counts {count} elements, but it has {len}");
-        Err(ReadError::Malformed { service: self.service.clone(), detail })
+        self.port.check(len, count).map(|()| Some(sample))
     }
 
     /// Returns the newest message and drops older ones; `None` if all were read.
-    pub(crate) fn newest(&self) -> Result<Option<SliceSample<T, H>>, ReadError> {
+    pub(crate) fn newest(&self) -> Result<Option<Sample<T, H>>, ReadError> {
         let mut newest = None;
         self.replace_by_newest(&mut newest)?;
         Ok(newest)
@@ -116,11 +132,11 @@ impl<T: Debug + ZeroCopySend + 'static, H: SliceHeader> SliceReader<T, H> {
     /// Replaces a message by the newest one, if any has arrived. At most two messages are held at a time.
     pub(crate) fn replace_by_newest(
         &self,
-        kept: &mut Option<SliceSample<T, H>>,
+        kept: &mut Option<Sample<T, H>>,
     ) -> Result<(), ReadError> {
         // The loop is bounded even if the writer is faster than it: there is at most a buffer of
         // the writer before the last load and a buffer of the present writer.
-        for _ in 0..2 * self.buffered {
+        for _ in 0..2 * self.port.buffered {
             match self.next() {
                 Ok(Some(sample)) => *kept = Some(sample),
                 Ok(None) => break,
@@ -134,7 +150,7 @@ impl<T: Debug + ZeroCopySend + 'static, H: SliceHeader> SliceReader<T, H> {
 
     /// Passes at most one buffer of messages to `sink`, oldest first.
     pub(crate) fn drain(&self, drained: &mut Drained, mut sink: impl FnMut(&H, &[T])) {
-        for _ in 0..self.buffered {
+        for _ in 0..self.port.buffered {
             match self.next() {
                 Ok(Some(sample)) => sink(sample.user_header(), sample.payload()),
                 Ok(None) => return,
@@ -146,113 +162,67 @@ impl<T: Debug + ZeroCopySend + 'static, H: SliceHeader> SliceReader<T, H> {
     }
 }
 
-/// A reader of a service of single values.
-#[derive(Debug)]
-pub(crate) struct ValueReader<T: Debug + Copy + ZeroCopySend + 'static> {
-    subscriber: Subscriber<ipc_threadsafe::Service, T, ()>,
-    service: String,
-    buffered: usize,
-    /// Accepted publishers; `None` accepts all.
-    source: Option<Arc<Source>>,
-}
-
-impl<T: Debug + Copy + ZeroCopySend + 'static> ValueReader<T> {
-    /// Reads the messages of the owner, and drops the messages of other publishers without a trace.
-    pub(crate) fn create(
-        service: &Values<T>,
-        spec: &ServiceSpec,
-        owner: &Arc<Source>,
-    ) -> Result<Self, ServiceError> {
-        let reader = Self::of_every_publisher(service, spec)?;
-        Ok(Self { source: Some(Arc::clone(owner)), ..reader })
-    }
-
-    pub(crate) fn of_every_publisher(
-        service: &Values<T>,
-        spec: &ServiceSpec,
-    ) -> Result<Self, ServiceError> {
-        let subscriber = subscribe(service, spec)?;
-        let (service, buffered) = (service.name().to_string(), spec.buffered);
-        Ok(Self { subscriber, service, buffered, source: None })
-    }
-
-    /// Returns the next value; `None` if all were read.
-    pub(crate) fn next(&self) -> Result<Option<T>, ReadError> {
-        let received = next_accepted(self.source.as_deref(), || self.subscriber.receive());
-        let sample =
-            received.map_err(|error| read_error(&self.service, BORROWED_UPDATES_MAX, error))?;
-        Ok(sample.map(|sample| *sample))
-    }
-
+impl<T: Pod + ZeroCopySend> Reader<T> {
     /// Returns the newest value and drops older ones; `None` if all were read.
-    pub(crate) fn newest(&self) -> Result<Option<T>, ReadError> {
-        let mut newest = None;
-        // As for slices: a buffer of the writer before, and a buffer of the present one.
-        for _ in 0..2 * self.buffered {
-            match self.next()? {
-                Some(value) => newest = Some(value),
-                None => break,
-            }
-        }
-        Ok(newest)
+    pub(crate) fn newest_value(&self) -> Result<Option<T>, ReadError> {
+        Ok(self.newest()?.and_then(|sample| sample.payload().first().copied()))
     }
 
     /// Passes at most one buffer of values to `sink`, oldest first.
-    pub(crate) fn drain(&self, drained: &mut Drained, mut sink: impl FnMut(&T)) {
-        for _ in 0..self.buffered {
-            match self.next() {
-                Ok(Some(value)) => sink(&value),
-                Ok(None) => return,
-                Err(error) => drained.errors.push(error),
+    pub(crate) fn drain_values(&self, drained: &mut Drained, sink: impl FnMut(&T)) {
+        let mut sink = sink;
+        self.drain(drained, |(), values| values.iter().for_each(&mut sink));
+    }
+}
+
+impl Port {
+    /// Connects a reader. It receives the latched message only where the contract has one: the mirror of a tunnel
+    /// latches every service.
+    fn create(
+        service: &raw::Service,
+        spec: &ServiceSpec,
+        source: Option<Arc<Source>>,
+    ) -> Result<Self, ServiceError> {
+        let full = SubscriberCreateError::ExceedsMaxSupportedSubscribers;
+        let limit = PortLimit { ports: "readers", max: service.static_config().max_subscribers() };
+        let create = || Subscriber::create(service, spec.history);
+        let subscriber = create_port(service, &full, limit, create)?;
+        let service = service.name().to_string();
+        let ServiceSpec { buffered, borrowed, .. } = *spec;
+        Ok(Self { subscriber, service, buffered, borrowed, source })
+    }
+
+    /// Receives the next message of an accepted publisher.
+    fn receive(&self) -> Result<Option<raw::Sample>, ReadError> {
+        for _ in 0..REFUSALS_MAX {
+            let received = self.subscriber.receive().map_err(|error| self.error(error))?;
+            let is_refused = |sample: &raw::Sample| {
+                self.source.as_ref().is_some_and(|source| !source.accepts(sample.node()))
+            };
+            if !received.as_ref().is_some_and(is_refused) {
+                return Ok(received);
             }
-            drained.count += 1;
+        }
+        Ok(None)
+    }
+
+    fn error(&self, error: ReceiveError) -> ReadError {
+        let service = self.service.clone();
+        match error {
+            ReceiveError::ExceedsMaxBorrows => {
+                ReadError::TooManyHeld { service, max: self.borrowed }
+            }
+            ReceiveError::ConnectionFailure(error) => ServiceError::failed(&service, &error).into(),
         }
     }
-}
 
-/// Connects a reader. It receives the latched message only where the contract has one: the mirror of a tunnel
-/// latches every service.
-pub(crate) fn subscribe<P, H>(
-    service: &publish_subscribe::PortFactory<ipc_threadsafe::Service, P, H>,
-    spec: &ServiceSpec,
-) -> Result<Subscriber<ipc_threadsafe::Service, P, H>, ServiceError>
-where
-    P: Debug + IceoryxSend + ?Sized,
-    H: Debug + ZeroCopySend,
-{
-    let full = SubscriberCreateError::ExceedsMaxSupportedSubscribers;
-    let limit = PortLimit { ports: "readers", max: service.static_config().max_subscribers() };
-    create_port(service, &full, limit, || {
-        service.subscriber_builder().history_request(spec.history).create()
-    })
-}
-
-/// Receives the next message of an accepted publisher.
-fn next_accepted<P, H>(
-    source: Option<&Source>,
-    receive: impl Fn() -> Result<Option<Sample<ipc_threadsafe::Service, P, H>>, ReceiveError>,
-) -> Result<Option<Sample<ipc_threadsafe::Service, P, H>>, ReceiveError>
-where
-    P: Debug + IceoryxSend + ?Sized,
-    H: Debug + ZeroCopySend,
-{
-    for _ in 0..REFUSALS_MAX {
-        let received = receive()?;
-        let is_refused = |sample: &Sample<ipc_threadsafe::Service, P, H>| {
-            source.is_some_and(|source| !source.accepts(sample.header().node_id()))
-        };
-        if !received.as_ref().is_some_and(is_refused) {
-            return Ok(received);
+    /// Compares the length of a payload with the one in its header.
+    fn check(&self, len: usize, count: u64) -> Result<(), ReadError> {
+        if len as u64 == count {
+            return Ok(());
         }
-    }
-    Ok(None)
-}
-
-fn read_error(service: &str, max: usize, error: ReceiveError) -> ReadError {
-    let service = service.to_owned();
-    match error {
-        ReceiveError::ExceedsMaxBorrows => ReadError::TooManyHeld { service, max },
-        ReceiveError::ConnectionFailure(error) => ServiceError::failed(&service, &error).into(),
+        let detail = format!("its header counts {count} elements, but it has {len}");
+        Err(ReadError::Malformed { service: self.service.clone(), detail })
     }
 }
 
@@ -261,6 +231,7 @@ mod tests {
     use super::*;
     use crate::ports::service::TEARS;
     use crate::ports::session::{Access, Session};
+    use crate::ports::writer::{Capacity, Writer};
     use crate::testing::TestDomain;
     use sim_messages::{TearsHeader, TornConstraint};
 
@@ -268,14 +239,14 @@ mod tests {
     fn a_message_with_a_wrong_length_in_its_header_is_dropped_and_the_next_one_is_read() {
         let domain = TestDomain::new();
         let session = Session::join(&domain.endpoint()).unwrap();
-        let service: Slices<TornConstraint, TearsHeader> =
-            session.slices(&TEARS, Access::Create).unwrap();
-        let reader = SliceReader::of_every_publisher(&service, &TEARS).unwrap();
-        let publisher = service.publisher_builder().initial_max_slice_len(2).create().unwrap();
+        let service: Service<TornConstraint, TearsHeader> =
+            session.service(&TEARS, Access::Create).unwrap();
+        let reader = Reader::of_every_publisher(&service, &TEARS).unwrap();
+        let capacity = Capacity { len_max: 2, samples: 3 };
+        let writer = Writer::create(session.config(), &service, capacity).unwrap();
         for count in [3, 2] {
-            let mut sample = publisher.loan_slice(2).unwrap();
-            sample.user_header_mut().count = count;
-            sample.send().unwrap();
+            let header = TearsHeader { count, ..TearsHeader::default() };
+            writer.send_elements(header, 2, |_| TornConstraint::default()).unwrap();
         }
         assert_eq!(
             reader.next().unwrap_err().to_string(),

@@ -17,12 +17,13 @@ use crate::endpoint::Endpoint;
 use crate::ports::domain::orphans::{self, Port};
 use crate::ports::domain::owner_lock::OwnerLock;
 use crate::ports::mirror::Mirror;
-use crate::ports::port::reader_count;
+use crate::ports::port::{Service, reader_count};
+use crate::ports::raw;
 use crate::ports::service::{
     BENDS, COLLIDERS, COMMANDS, FORCES, KEYFRAME, OUTCOMES, PARAMETERS, PARTICLES, READY, RESTORE,
     SCENE, STATUS, SURFACE, ServiceError, TEARS, TOPOLOGY,
 };
-use crate::ports::session::{Access, Events, Session, Slices, Values};
+use crate::ports::session::{Access, Events, Session};
 use crate::ports::source::{Source, is_mirror, owner_nodes};
 
 /// The services of a name, except `status`.
@@ -30,20 +31,20 @@ use crate::ports::source::{Source, is_mirror, owner_nodes};
 pub(crate) struct Services {
     /// Configuration of the domain.
     pub(crate) config: Config,
-    pub(crate) particles: Slices<ParticleState, SnapshotHeader>,
-    pub(crate) keyframe: Slices<u8, KeyframeHeader>,
-    pub(crate) topology: Slices<ConstraintState, LoadHeader>,
-    pub(crate) bends: Slices<BendState, LoadHeader>,
-    pub(crate) surface: Slices<Triangle, LoadHeader>,
-    pub(crate) scene: Slices<u8, LoadHeader>,
-    pub(crate) tears: Slices<TornConstraint, TearsHeader>,
-    pub(crate) parameters: Slices<ParameterState, ParametersHeader>,
-    pub(crate) colliders: Slices<ColliderState, CollidersHeader>,
-    pub(crate) forces: Slices<ForceRow, ForcesHeader>,
-    pub(crate) commands: Values<Command>,
-    pub(crate) outcomes: Values<Outcome>,
-    pub(crate) ready: Values<Ready>,
-    pub(crate) restore: Slices<u8, RestoreHeader>,
+    pub(crate) particles: Service<ParticleState, SnapshotHeader>,
+    pub(crate) keyframe: Service<u8, KeyframeHeader>,
+    pub(crate) topology: Service<ConstraintState, LoadHeader>,
+    pub(crate) bends: Service<BendState, LoadHeader>,
+    pub(crate) surface: Service<Triangle, LoadHeader>,
+    pub(crate) scene: Service<u8, LoadHeader>,
+    pub(crate) tears: Service<TornConstraint, TearsHeader>,
+    pub(crate) parameters: Service<ParameterState, ParametersHeader>,
+    pub(crate) colliders: Service<ColliderState, CollidersHeader>,
+    pub(crate) forces: Service<ForceRow, ForcesHeader>,
+    pub(crate) commands: Service<Command>,
+    pub(crate) outcomes: Service<Outcome>,
+    pub(crate) ready: Service<Ready>,
+    pub(crate) restore: Service<u8, RestoreHeader>,
     pub(crate) wake: Events,
 }
 
@@ -53,68 +54,58 @@ impl Services {
     pub(crate) fn access(session: &Session, access: Access) -> Result<Self, ServiceError> {
         Ok(Self {
             config: session.config().clone(),
-            particles: session.slices(&PARTICLES, access)?,
-            keyframe: session.slices(&KEYFRAME, access)?,
-            topology: session.slices(&TOPOLOGY, access)?,
-            bends: session.slices(&BENDS, access)?,
-            surface: session.slices(&SURFACE, access)?,
-            scene: session.slices(&SCENE, access)?,
-            tears: session.slices(&TEARS, access)?,
-            parameters: session.slices(&PARAMETERS, access)?,
-            colliders: session.slices(&COLLIDERS, access)?,
-            forces: session.slices(&FORCES, access)?,
-            commands: session.values(&COMMANDS, access)?,
-            outcomes: session.values(&OUTCOMES, access)?,
-            ready: session.values(&READY, access)?,
-            restore: session.slices(&RESTORE, access)?,
+            particles: session.service(&PARTICLES, access)?,
+            keyframe: session.service(&KEYFRAME, access)?,
+            topology: session.service(&TOPOLOGY, access)?,
+            bends: session.service(&BENDS, access)?,
+            surface: session.service(&SURFACE, access)?,
+            scene: session.service(&SCENE, access)?,
+            tears: session.service(&TEARS, access)?,
+            parameters: session.service(&PARAMETERS, access)?,
+            colliders: session.service(&COLLIDERS, access)?,
+            forces: session.service(&FORCES, access)?,
+            commands: session.service(&COMMANDS, access)?,
+            outcomes: session.service(&OUTCOMES, access)?,
+            ready: session.service(&READY, access)?,
+            restore: session.service(&RESTORE, access)?,
             wake: session.events(access)?,
         })
     }
-}
 
-impl Services {
+    /// Returns the publish-subscribe services. The owner writes all but the last three.
+    fn publish_subscribe(&self) -> [&raw::Service; 14] {
+        [
+            &self.particles,
+            &self.keyframe,
+            &self.topology,
+            &self.bends,
+            &self.surface,
+            &self.scene,
+            &self.tears,
+            &self.parameters,
+            &self.colliders,
+            &self.forces,
+            &self.outcomes,
+            &self.commands,
+            &self.ready,
+            &self.restore,
+        ]
+    }
+
     /// Returns the ports of all services, living or dead.
     pub(crate) fn ports(&self) -> Vec<Port> {
-        [
-            orphans::ports(&self.particles),
-            orphans::ports(&self.keyframe),
-            orphans::ports(&self.topology),
-            orphans::ports(&self.bends),
-            orphans::ports(&self.surface),
-            orphans::ports(&self.scene),
-            orphans::ports(&self.tears),
-            orphans::ports(&self.parameters),
-            orphans::ports(&self.colliders),
-            orphans::ports(&self.forces),
-            orphans::ports(&self.commands),
-            orphans::ports(&self.outcomes),
-            orphans::ports(&self.ready),
-            orphans::ports(&self.restore),
-            orphans::event_ports(&self.wake),
-        ]
-        .concat()
+        let ports = self.publish_subscribe().into_iter().flat_map(orphans::ports);
+        ports.chain(orphans::event_ports(&self.wake)).collect()
     }
 
     /// Returns `true` once the owner receives what clients send. It creates its ports after the services.
     fn are_received(&self) -> bool {
-        [reader_count(&self.commands), reader_count(&self.ready), reader_count(&self.restore)]
-            .iter()
-            .all(|count| *count > 0)
+        self.publish_subscribe()[11..].iter().all(|service| reader_count(service) > 0)
     }
 
     /// Returns the number of readers of everything that the owner publishes, except the status.
     pub(crate) fn reader_count(&self) -> usize {
-        reader_count(&self.particles)
-            + reader_count(&self.keyframe)
-            + reader_count(&self.topology)
-            + reader_count(&self.bends)
-            + reader_count(&self.surface)
-            + reader_count(&self.scene)
-            + reader_count(&self.tears)
-            + reader_count(&self.parameters)
-            + reader_count(&self.colliders)
-            + reader_count(&self.forces)
-            + reader_count(&self.outcomes)
+        self.publish_subscribe()[..11].iter().map(|service| reader_count(service)).sum()
     }
 }
 
@@ -171,7 +162,7 @@ pub(crate) struct OwnerProcess {
 
 /// Returns the living process of one of these iceoryx2 nodes, which have publishers of `status`.
 pub(crate) fn living_process(
-    status: &Values<NodeStatus>,
+    status: &Service<NodeStatus>,
     nodes: &[UniqueNodeId],
 ) -> Option<OwnerProcess> {
     let mut process = None;
@@ -194,7 +185,7 @@ pub(crate) fn living_process(
 #[derive(Debug)]
 pub(crate) struct Attachment {
     pub(crate) services: Services,
-    pub(crate) status: Arc<Values<NodeStatus>>,
+    pub(crate) status: Arc<Service<NodeStatus>>,
     /// The connection to an owner on another host; `None` for one on this host.
     mirror: Option<Mirror>,
     /// The processes whose messages count, for all readers of this attachment.
@@ -220,7 +211,7 @@ impl Attachment {
 
     /// Opens all services of a living owner, once it receives commands.
     pub(crate) fn open(session: Session) -> Result<Self, AttachError> {
-        let status = match session.values(&STATUS, Access::Open) {
+        let status = match session.service(&STATUS, Access::Open) {
             Err(ServiceError::Missing { service, .. }) => {
                 let detail = format!("service '{service}' does not exist");
                 return Err(no_node(session.config(), &session.endpoint, detail));
@@ -253,7 +244,7 @@ impl Attachment {
     /// Connects to an owner on another host.
     fn open_mirror(
         session: Session,
-        status: Arc<Values<NodeStatus>>,
+        status: Arc<Service<NodeStatus>>,
         services: Services,
     ) -> Result<Self, AttachError> {
         let Services { particles, ready, .. } = &services;
@@ -382,7 +373,7 @@ mod tests {
     fn a_foreign_service_is_not_mistaken_for_another_version() {
         let domain = TestDomain::new();
         let session = join(&domain, CONTRACT_VERSION);
-        let _foreign = session.values::<u64>(&STATUS, Access::Create).unwrap();
+        let _foreign = session.service::<u64, ()>(&STATUS, Access::Create).unwrap();
         let error = Attachment::open(join(&domain, CONTRACT_VERSION)).unwrap_err();
         assert_eq!(
             error.to_string(),

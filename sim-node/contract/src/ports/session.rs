@@ -5,11 +5,12 @@ use std::fmt::Debug;
 use std::fs::File;
 use std::time::Duration;
 
+use bytemuck::Pod;
 use iceoryx2::prelude::{
-    AttributeSet, AttributeVerifier, Config, IceoryxSend, Node, NodeBuilder, NodeName, PortFactory,
-    SemanticStringError, Service, ServiceName, SignalHandlingMode, ZeroCopySend, ipc_threadsafe,
+    AttributeSet, AttributeVerifier, Config, Node, NodeBuilder, NodeName, PortFactory,
+    SemanticStringError, Service as _, ServiceName, SignalHandlingMode, ZeroCopySend,
+    ipc_threadsafe,
 };
-use iceoryx2::service::builder::publish_subscribe::Builder;
 use iceoryx2::service::port_factory;
 use sim_messages::{CONTRACT_VERSION, PARTICIPANTS_MAX};
 
@@ -19,15 +20,11 @@ use crate::ports::domain::orphans::{self, Port};
 use crate::ports::domain::owner_lock::{LockPlace, OwnerLock};
 use crate::ports::domain::{self, counter, root, unfinished};
 use crate::ports::memory;
+use crate::ports::port::{Header, Service};
+use crate::ports::raw::{self, MessageType};
 use crate::ports::service::{Cause, ServiceError, ServiceSpec, VERSION_KEY, WAKE, WhenFull};
 use crate::ports::wake::Wake;
 
-/// A publish-subscribe service whose messages are slices of `T` with the header `H`.
-pub(crate) type Slices<T, H> =
-    port_factory::publish_subscribe::PortFactory<ipc_threadsafe::Service, [T], H>;
-/// A publish-subscribe service whose messages are single values.
-pub(crate) type Values<T> =
-    port_factory::publish_subscribe::PortFactory<ipc_threadsafe::Service, T, ()>;
 /// An event service.
 pub(crate) type Events = port_factory::event::PortFactory<ipc_threadsafe::Service>;
 
@@ -164,39 +161,23 @@ impl Session {
         !OwnerLock::left_files(self.node.config(), self.endpoint.name()).is_empty()
     }
 
-    /// Opens or creates a service of slices of `T` with the header `H`.
-    pub(crate) fn slices<T, H>(
+    /// Opens or creates a publish-subscribe service.
+    pub(crate) fn service<T: Pod + ZeroCopySend, H: Header>(
         &self,
         spec: &ServiceSpec,
         access: Access,
-    ) -> Result<Slices<T, H>, ServiceError>
-    where
-        T: Debug + ZeroCopySend,
-        H: Debug + ZeroCopySend,
-    {
-        self.retry(spec, access, |name| {
-            let builder = self.node.service_builder(name).publish_subscribe::<[T]>();
-            let builder = builder.user_header::<H>();
-            match access {
-                Access::Open => self.of_this_version(builder.open()?),
-                Access::Create => {
-                    Ok(with_quality(builder, spec).open_or_create_with_attributes(&self.version)?)
-                }
-            }
-        })
+    ) -> Result<Service<T, H>, ServiceError> {
+        self.raw_service(spec, access, &Service::<T, H>::message_type()).map(Service::of)
     }
 
-    /// Opens or creates a service of single values.
-    pub(crate) fn values<T>(
+    fn raw_service(
         &self,
         spec: &ServiceSpec,
         access: Access,
-    ) -> Result<Values<T>, ServiceError>
-    where
-        T: Debug + ZeroCopySend,
-    {
+        message: &MessageType,
+    ) -> Result<raw::Service, ServiceError> {
         self.retry(spec, access, |name| {
-            let builder = self.node.service_builder(name).publish_subscribe::<T>();
+            let builder = raw::builder(&self.node, name, message);
             match access {
                 Access::Open => self.of_this_version(builder.open()?),
                 Access::Create => {
@@ -348,14 +329,7 @@ fn version_attribute(contract_version: u32) -> Result<AttributeVerifier, Box<dyn
     Ok(AttributeVerifier::new().require(&key, &value)?)
 }
 
-fn with_quality<P, H>(
-    builder: Builder<P, H, ipc_threadsafe::Service>,
-    spec: &ServiceSpec,
-) -> Builder<P, H, ipc_threadsafe::Service>
-where
-    P: Debug + IceoryxSend + ?Sized,
-    H: Debug + ZeroCopySend,
-{
+fn with_quality(builder: raw::Builder, spec: &ServiceSpec) -> raw::Builder {
     builder
         .max_publishers(spec.publishers_max)
         .max_subscribers(spec.readers_max)

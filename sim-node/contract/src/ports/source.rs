@@ -8,8 +8,9 @@ use iceoryx2::prelude::{CallbackProgression, PortFactory, ipc_threadsafe};
 use sim_messages::NodeStatus;
 
 use crate::ports::domain::owner_lock::LockPlace;
+use crate::ports::port::Service;
 use crate::ports::service::OWNER_PORT;
-use crate::ports::session::{Values, version_of};
+use crate::ports::session::version_of;
 
 /// Most processes to remember: the present owner, earlier owners with unread messages, and processes that only claim to be
 /// the owner.
@@ -23,7 +24,7 @@ const REMEMBERED_MAX: usize = 8;
 /// unread when another process has taken the name.
 #[derive(Debug)]
 pub(crate) struct Source {
-    status: Arc<Values<NodeStatus>>,
+    status: Arc<Service<NodeStatus>>,
     lock: LockPlace,
     /// Newest last.
     remembered: Mutex<VecDeque<Remembered>>,
@@ -38,7 +39,7 @@ struct Remembered {
 
 impl Source {
     /// Accepts the present owner, even if it is gone when its messages are read, and later owners.
-    pub(crate) fn new(status: &Arc<Values<NodeStatus>>, lock: LockPlace) -> Self {
+    pub(crate) fn new(status: &Arc<Service<NodeStatus>>, lock: LockPlace) -> Self {
         let source = Self { status: Arc::clone(status), lock, remembered: Mutex::default() };
         source.remember_new();
         source
@@ -88,13 +89,13 @@ fn is_holder(node: UniqueNodeId, lock: &LockPlace) -> bool {
 }
 
 /// Returns `true` if a tunnel has created the service.
-pub(crate) fn is_mirror(service: &Values<NodeStatus>) -> bool {
+pub(crate) fn is_mirror(service: &Service<NodeStatus>) -> bool {
     version_of(service.attributes()).is_none()
 }
 
 /// Returns the iceoryx2 nodes, living or dead, that call themselves the owner: the publishers of `status` that are
 /// named as an owner's. A tunnel has one without that name.
-pub(crate) fn claiming_nodes(status: &Values<NodeStatus>) -> Vec<UniqueNodeId> {
+pub(crate) fn claiming_nodes(status: &Service<NodeStatus>) -> Vec<UniqueNodeId> {
     let mut nodes = Vec::new();
     status.dynamic_config().list_publishers(|publisher| {
         if publisher.publisher_name.as_str() == OWNER_PORT {
@@ -106,14 +107,14 @@ pub(crate) fn claiming_nodes(status: &Values<NodeStatus>) -> Vec<UniqueNodeId> {
 }
 
 /// Returns the iceoryx2 nodes of the owners of the name, living or dead.
-pub(crate) fn owner_nodes(status: &Values<NodeStatus>, lock: &LockPlace) -> Vec<UniqueNodeId> {
+pub(crate) fn owner_nodes(status: &Service<NodeStatus>, lock: &LockPlace) -> Vec<UniqueNodeId> {
     let mut nodes = claiming_nodes(status);
     nodes.retain(|node| is_holder(*node, lock));
     nodes
 }
 
 /// Returns the iceoryx2 nodes of all publishers of `status`. Those of a mirror are the tunnel's.
-fn publisher_nodes(status: &Values<NodeStatus>) -> Vec<UniqueNodeId> {
+fn publisher_nodes(status: &Service<NodeStatus>) -> Vec<UniqueNodeId> {
     let mut nodes = Vec::new();
     status.dynamic_config().list_publishers(|publisher| {
         nodes.push(publisher.node_id);

@@ -4,21 +4,19 @@
 //! is, and forgets the dead node. So a process that is killed between the two, while it cleans up after
 //! another one, leaves a place taken for as long as any process has the service open.
 
-use std::fmt::Debug;
 use std::fs::{self, OpenOptions};
 use std::io::{self, Write};
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::Path;
 
 use iceoryx2::identifiers::UniqueNodeId;
-use iceoryx2::prelude::{
-    CallbackProgression, Config, IceoryxSend, Node, PortFactory, ZeroCopySend, ipc_threadsafe,
-};
-use iceoryx2::service::port_factory::{event, publish_subscribe};
+use iceoryx2::prelude::{CallbackProgression, Config, Node, PortFactory, ipc_threadsafe};
+use iceoryx2::service::port_factory::event;
 use iceoryx2::service::service_hash::ServiceHash;
 
 use crate::ports::domain::root;
 use crate::ports::domain::unfinished::{self, is_alive, process};
+use crate::ports::raw;
 
 /// A port in the list of a service.
 #[derive(Debug, Clone, Copy)]
@@ -29,13 +27,7 @@ pub(crate) struct Port {
 }
 
 /// Returns the publishers and subscribers of a service, living or dead.
-pub(crate) fn ports<P, H>(
-    service: &publish_subscribe::PortFactory<ipc_threadsafe::Service, P, H>,
-) -> Vec<Port>
-where
-    P: Debug + IceoryxSend + ?Sized,
-    H: Debug + ZeroCopySend,
-{
+pub(crate) fn ports(service: &raw::Service) -> Vec<Port> {
     let mut ports = Vec::new();
     let mut add = |node, id| {
         ports.push(Port { node, id, service: *service.service_hash() });
