@@ -10,9 +10,10 @@ use iceoryx2::prelude::Config;
 
 use crate::domain::nodes::ListedNode;
 use crate::endpoint::Endpoint;
-use crate::ports::domain::leftovers::{self, Leftover};
 use crate::ports::domain::root::RootError;
-use crate::ports::domain::{self, counter, root, unfinished};
+use crate::ports::domain::{self, files, root};
+use crate::ports::leftovers::on_request::{self, Leftover};
+use crate::ports::leftovers::unfinished;
 use crate::ports::memory;
 use crate::ports::service::ServiceError;
 use crate::ports::session::Session;
@@ -58,7 +59,7 @@ impl Domain {
     pub fn check_root(&self) -> Result<bool, RootError> {
         let exists = root::exists(&self.root())?;
         if self.endpoint.domain().is_some() {
-            counter::check(&self.config)?;
+            files::check_counter(&self.config)?;
         }
         Ok(exists)
     }
@@ -92,7 +93,7 @@ impl Domain {
 
     /// Returns the files of this user that dead processes have left in this domain. Changes nothing.
     pub fn leftovers(&self) -> Vec<Leftover> {
-        leftovers::find(&self.config)
+        on_request::find(&self.config)
     }
 
     /// Removes the leftovers. Files of living processes stay, of stopped ones too, and so do those of other
@@ -102,11 +103,11 @@ impl Domain {
     /// This process cannot join the domain.
     pub fn remove_leftovers(&self) -> Result<(), ServiceError> {
         // First, because they may be all that keeps this process from joining.
-        leftovers::remove_segments(&self.config);
+        on_request::remove_segments(&self.config);
         let session = Session::join(&self.endpoint)?;
         unfinished::remove_nodes(&self.config);
-        leftovers::remove_names(&self.config);
-        leftovers::remove_segments(&self.config);
+        on_request::remove_names(&self.config);
+        on_request::remove_segments(&self.config);
         drop(session);
         Ok(())
     }

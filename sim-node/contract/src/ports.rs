@@ -1,10 +1,10 @@
 //! Services, readers and writers. Beside the derives of the messages, only these files, `owner.rs`,
 //! `client/watch.rs` and those of `domain` name iceoryx2.
 
-pub(crate) mod cleanup;
 pub(crate) mod connection;
 pub(crate) mod domain;
 pub(crate) mod latch;
+pub(crate) mod leftovers;
 pub(crate) mod memory;
 pub(crate) mod mirror;
 pub(crate) mod port;

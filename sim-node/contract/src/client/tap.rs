@@ -373,7 +373,7 @@ mod tests {
     use crate::owner::Owner;
     use crate::owner::load::Load;
     use crate::ports::domain;
-    use crate::ports::domain::owner_lock::OwnerLock;
+    use crate::ports::leftovers::lock::OwnerLock;
     use crate::ports::port::Service;
     use crate::ports::session::{Access, Session};
     use crate::ports::source::Source;

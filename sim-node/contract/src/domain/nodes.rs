@@ -10,8 +10,9 @@ use sim_messages::{CONSOLE_CLIENT_ID, NodeStatus};
 
 use crate::client::Client;
 use crate::endpoint::Endpoint;
-use crate::ports::domain::owner_lock::OwnerLock;
-use crate::ports::domain::{lock_list, root, unfinished};
+use crate::ports::domain::root;
+use crate::ports::leftovers::lock::OwnerLock;
+use crate::ports::leftovers::{lock, unfinished};
 use crate::ports::service::{STATUS, ServiceError};
 use crate::ports::services::AttachError;
 
@@ -56,7 +57,7 @@ pub(crate) fn list(
 ) -> Result<Vec<ListedNode>, ServiceError> {
     let exists = root::exists(&root::path(config))
         .map_err(|cause| ServiceError::Root { endpoint: endpoint.clone(), cause })?;
-    let mut names = lock_list::names(config);
+    let mut names = lock::names(config);
     if exists {
         names.extend(names_of_services(config));
     }

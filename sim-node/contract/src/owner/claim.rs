@@ -7,9 +7,10 @@ use sim_messages::NodeStatus;
 
 use crate::endpoint::Endpoint;
 use crate::owner::error::OwnerError;
-use crate::ports::domain::owner_lock::{LockError, OwnerLock};
 use crate::ports::domain::root::RootError;
-use crate::ports::domain::{self, orphans, root, unfinished};
+use crate::ports::domain::{self, root};
+use crate::ports::leftovers::lock::{LockError, OwnerLock};
+use crate::ports::leftovers::{orphans, unfinished};
 use crate::ports::port::Service;
 use crate::ports::service::{OWNER_PORT, STATUS, ServiceError};
 use crate::ports::services::{OwnerProcess, living_process};

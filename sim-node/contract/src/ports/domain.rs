@@ -1,14 +1,7 @@
 //! Separation of domains: the prefix and the directory of iceoryx2's files.
 
-pub(crate) mod counter;
 pub(crate) mod files;
-pub(crate) mod leftovers;
-pub(crate) mod lock_list;
-pub(crate) mod mapped;
-pub(crate) mod orphans;
-pub(crate) mod owner_lock;
 pub(crate) mod root;
-pub(crate) mod unfinished;
 
 use std::path::PathBuf;
 use std::sync::Once;

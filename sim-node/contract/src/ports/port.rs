@@ -12,7 +12,7 @@ use sim_messages::{
     SnapshotHeader, TearsHeader,
 };
 
-use crate::ports::cleanup;
+use crate::ports::leftovers;
 use crate::ports::memory;
 use crate::ports::raw::{self, MessageType};
 use crate::ports::service::ServiceError;
@@ -104,7 +104,7 @@ pub(crate) fn create_port<T, E: PartialEq + Debug>(
         .map_err(|memory| ServiceError::Memory { service: service.name().to_string(), memory })?;
     let created = match create() {
         Err(error) if error == *full => {
-            cleanup::free_ports(service);
+            leftovers::free_ports(service);
             create()
         }
         result => result,

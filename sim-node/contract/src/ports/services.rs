@@ -14,8 +14,8 @@ use sim_messages::{
 use thiserror::Error;
 
 use crate::endpoint::Endpoint;
-use crate::ports::domain::orphans::{self, Port};
-use crate::ports::domain::owner_lock::OwnerLock;
+use crate::ports::leftovers::lock::OwnerLock;
+use crate::ports::leftovers::orphans::{self, Port};
 use crate::ports::mirror::Mirror;
 use crate::ports::port::{Service, reader_count};
 use crate::ports::raw;

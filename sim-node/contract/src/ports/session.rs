@@ -15,10 +15,11 @@ use iceoryx2::service::port_factory;
 use sim_messages::{CONTRACT_VERSION, PARTICIPANTS_MAX};
 
 use crate::endpoint::Endpoint;
-use crate::ports::cleanup;
-use crate::ports::domain::orphans::{self, Port};
-use crate::ports::domain::owner_lock::{LockPlace, OwnerLock};
-use crate::ports::domain::{self, counter, root, unfinished};
+use crate::ports::domain::{self, files, root};
+use crate::ports::leftovers;
+use crate::ports::leftovers::lock::{LockPlace, OwnerLock};
+use crate::ports::leftovers::orphans::{self, Port};
+use crate::ports::leftovers::unfinished;
 use crate::ports::memory;
 use crate::ports::port::{Header, Service};
 use crate::ports::raw::{self, MessageType};
@@ -61,7 +62,7 @@ pub(crate) enum Access {
 impl Drop for Session {
     /// The last process of a domain leaves nothing of killed ones.
     fn drop(&mut self) {
-        cleanup::clean_domain(&self.node);
+        leftovers::clean_domain(&self.node);
     }
 }
 
@@ -102,7 +103,7 @@ impl Session {
             .map_err(|memory| ServiceError::NoMemory { endpoint: endpoint.clone(), memory })?;
         let is_named = endpoint.domain().is_some();
         if is_named {
-            counter::check(&config).map_err(private)?;
+            files::check_counter(&config).map_err(private)?;
         }
         let node = NodeBuilder::new()
             .name(&node_name(endpoint).map_err(|error| refused(&error))?)
@@ -110,9 +111,9 @@ impl Session {
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .create::<ipc_threadsafe::Service>()
             .map_err(|error| refused(&error))?;
-        cleanup::clean_domain(&node);
+        leftovers::clean_domain(&node);
         if is_named {
-            counter::narrow(&config);
+            files::narrow_counter(&config);
         }
         let version = version_attribute(contract_version).map_err(|error| refused(&error))?;
         Ok(Self { endpoint: endpoint.clone(), node, contract_version, version, _root: root })
@@ -130,7 +131,7 @@ impl Session {
     /// of the lock of the name.
     pub(crate) fn restore_orphans(&self, ports: &[Port]) {
         if orphans::restore_nodes(self.node.config(), self.node_id(), ports) {
-            cleanup::free_places(&self.node);
+            leftovers::free_places(&self.node);
         }
     }
 
@@ -253,7 +254,7 @@ impl Session {
                 Ok(service) => return Ok(service),
                 Err(Cause::Full) if !has_cleaned_up => {
                     has_cleaned_up = true;
-                    cleanup::free_places(&self.node);
+                    leftovers::free_places(&self.node);
                 }
                 Err(Cause::Stuck(_)) if access == Access::Open && self.is_abandoned() => {
                     return Err(self.service_error(spec, service, Cause::Missing));

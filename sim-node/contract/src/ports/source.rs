@@ -7,7 +7,7 @@ use iceoryx2::identifiers::UniqueNodeId;
 use iceoryx2::prelude::{CallbackProgression, PortFactory, ipc_threadsafe};
 use sim_messages::NodeStatus;
 
-use crate::ports::domain::owner_lock::LockPlace;
+use crate::ports::leftovers::lock::LockPlace;
 use crate::ports::port::Service;
 use crate::ports::service::OWNER_PORT;
 use crate::ports::session::version_of;

@@ -1,10 +1,13 @@
-//! The files of a domain.
+//! The files of a domain in shared memory, and the one that every process opens when it joins: the counter of nodes.
 
 use std::fmt::Display;
-use std::fs::{self, DirEntry};
+use std::fs::{self, DirEntry, Permissions};
+use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 
 use iceoryx2::prelude::{Config, FileName};
+
+use crate::ports::domain::root::RootError;
 
 /// The directory of shared memory.
 pub(crate) const SHARED_MEMORY: &str = "/dev/shm";
@@ -39,4 +42,28 @@ pub(crate) fn segment(config: &Config, suffix: &FileName, id: u128) -> Option<Pa
 /// Returns the entries of a directory; none if it cannot be read.
 pub(crate) fn entries(directory: &Path) -> impl Iterator<Item = DirEntry> {
     fs::read_dir(directory).into_iter().flatten().flatten()
+}
+
+/// Checks that the counter of a named domain is this user's own, or does not exist yet.
+///
+/// The counter of iceoryx2's own domain stays open to all users: their other programs may share it under
+/// a root of their own.
+pub(crate) fn check_counter(config: &Config) -> Result<(), RootError> {
+    let user = rustix::process::geteuid().as_raw();
+    for path in segments(config, &config.global.node.global_mgmt_suffix) {
+        match fs::metadata(&path).map(|metadata| metadata.uid()) {
+            Ok(owner) if owner != user => return Err(RootError::OtherOwner { path, owner, user }),
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+/// Takes the permission to write the counter from other users. iceoryx2 gives it to everybody, and
+/// another user who truncates the segment ends every process that opens it.
+pub(crate) fn narrow_counter(config: &Config) {
+    for path in segments(config, &config.global.node.global_mgmt_suffix) {
+        // Without the permission to change it, it is not this user's segment.
+        let _ = fs::set_permissions(&path, Permissions::from_mode(0o600));
+    }
 }

@@ -1,6 +1,6 @@
-//! Files that dead processes have left in a domain. Most of them vanish when the next program joins; some
-//! stay until somebody asks for their removal.
+//! The leftovers of a domain as a list, and the removal of those that stay until somebody asks for it.
 
+use std::collections::HashSet;
 use std::fs;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
@@ -8,11 +8,13 @@ use std::time::Duration;
 
 use iceoryx2::node::NodeView;
 use iceoryx2::prelude::{CallbackProgression, Config, Node, NodeState, ipc_threadsafe};
+use rustix::fs::{major, minor};
 use sim_host::clock;
 
 use crate::ports::domain::files::segments;
-use crate::ports::domain::owner_lock::OwnerLock;
-use crate::ports::domain::{lock_list, mapped, root, unfinished};
+use crate::ports::domain::root;
+use crate::ports::leftovers::lock::{self, OwnerLock};
+use crate::ports::leftovers::unfinished;
 use crate::ports::service::SERVICES;
 
 /// Time after which a file that no living node names is one of a dead process. A process that is creating
@@ -56,7 +58,7 @@ pub enum LeftoverKind {
 /// Finds the leftovers of a domain, and changes nothing.
 pub(crate) fn find(config: &Config) -> Vec<Leftover> {
     let mut paths = Vec::new();
-    for name in lock_list::names(config) {
+    for name in lock::names(config) {
         let files = OwnerLock::left_files(config, &name);
         paths.extend(files.into_iter().map(|path| (LeftoverKind::Lock, path)));
     }
@@ -82,7 +84,7 @@ pub(crate) fn find(config: &Config) -> Vec<Leftover> {
 /// process has open. Call it after joining, which removes what iceoryx2 knows.
 pub(crate) fn remove_names(config: &Config) {
     let dead = dead_services(config);
-    let mut names = lock_list::names(config);
+    let mut names = lock::names(config);
     names.retain(|name| !OwnerLock::left_files(config, name).is_empty());
     names.extend(dead.iter().map(|service| service.name.clone()));
     for name in names {
@@ -190,22 +192,65 @@ fn dead_segments(config: &Config) -> Vec<PathBuf> {
             && unfinished::ports(path).all(|id| !unfinished::is_alive(unfinished::process(id)))
     }));
     dead.retain(|path| is_old(path));
-    mapped::remove_mapped(&mut dead);
+    remove_mapped(&mut dead);
     dead
 }
 
 /// Returns `true` if nothing tells which segments belong to living processes, because these may run in
 /// containers or have lost their files to a cleaner.
 fn is_uncertain(config: &Config) -> bool {
-    let names = lock_list::names_in_shared_memory(config);
+    let names = lock::names_in_shared_memory(config);
     let has_hidden_node = names.iter().any(|name| OwnerLock::is_hidden(config, name));
     let is_shared = config.global.prefix == Config::default().global.prefix;
     let namespace = fs::read_link("/proc/self/ns/pid").unwrap_or_default();
-    has_hidden_node || is_shared && !mapped::sees_all_processes(&namespace)
+    has_hidden_node || is_shared && !sees_all_processes(&namespace)
 }
 
 fn is_old(path: &Path) -> bool {
     fs::metadata(path).is_ok_and(|file| clock::age(&file) > AGE_MIN)
+}
+
+/// A file of this host.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+struct FileId {
+    device: (u32, u32),
+    inode: u64,
+}
+
+/// Removes the files from a list that a process of this user has mapped, as far as this process sees others.
+fn remove_mapped(paths: &mut Vec<PathBuf>) {
+    if !paths.is_empty() {
+        let mapped = mapped_files();
+        paths.retain(|path| file_id(path).is_some_and(|file| !mapped.contains(&file)));
+    }
+}
+
+fn file_id(path: &Path) -> Option<FileId> {
+    let file = fs::metadata(path).ok()?;
+    Some(FileId { device: (major(file.dev()), minor(file.dev())), inode: file.ino() })
+}
+
+fn mapped_files() -> HashSet<FileId> {
+    let processes = fs::read_dir("/proc").into_iter().flatten().flatten();
+    // The maps of other users' processes cannot be read, and these cannot map files of this user.
+    let maps = processes.filter_map(|process| fs::read_to_string(process.path().join("maps")).ok());
+    maps.flat_map(|maps| maps.lines().filter_map(parse).collect::<Vec<_>>()).collect()
+}
+
+/// Parses a line of `/proc/<process>/maps`: addresses, permissions, offset, device, inode and path.
+fn parse(line: &str) -> Option<FileId> {
+    let mut fields = line.split_ascii_whitespace().skip(3);
+    let (major, minor) = fields.next()?.split_once(':')?;
+    let number = |text| u32::from_str_radix(text, 16).ok();
+    let inode = fields.next()?.parse().ok()?;
+    Some(FileId { device: (number(major)?, number(minor)?), inode })
+}
+
+/// Returns `true` if this process sees all processes of the host, because it is in no container. `link` is
+/// its namespace of processes: the target of `/proc/self/ns/pid`.
+fn sees_all_processes(link: &Path) -> bool {
+    // The number of the first namespace is fixed in the kernel (PROC_PID_INIT_INO).
+    link == Path::new("pid:[4026531836]")
 }
 
 #[cfg(test)]
@@ -332,5 +377,30 @@ mod tests {
         assert!(found.iter().all(|one| one.kind == LeftoverKind::Service), "{found:?}");
         outside.remove_leftovers().unwrap();
         assert!(texts.iter().all(|(_, path)| !path.exists()));
+    }
+
+    #[test]
+    fn a_line_of_maps_names_its_file_by_device_and_inode() {
+        let line = "7f1c4a000000-7f1c4a021000 rw-s 00000000 00:1a 513  /dev/shm/lab_x y.data";
+        assert_eq!(parse(line), Some(FileId { device: (0, 0x1a), inode: 513 }));
+        assert_eq!(
+            parse("7ffd1000-7ffd2000 r-xp 00000000 00:00 0  [vdso]").map(|it| it.inode),
+            Some(0)
+        );
+        assert_eq!(parse(""), None);
+    }
+
+    #[test]
+    fn only_files_that_are_mapped_are_removed() {
+        let program = fs::read_link("/proc/self/exe").unwrap();
+        let mut paths = vec![program, PathBuf::from("/dev/null"), PathBuf::from("/nowhere")];
+        remove_mapped(&mut paths);
+        assert_eq!(paths, [Path::new("/dev/null")]);
+    }
+
+    #[test]
+    fn a_process_in_a_container_does_not_see_all() {
+        assert!(sees_all_processes(Path::new("pid:[4026531836]")));
+        assert!(!sees_all_processes(Path::new("pid:[4026532451]")));
     }
 }

@@ -15,7 +15,7 @@ use iceoryx2::service::port_factory::event;
 use iceoryx2::service::service_hash::ServiceHash;
 
 use crate::ports::domain::root;
-use crate::ports::domain::unfinished::{self, is_alive, process};
+use crate::ports::leftovers::unfinished::{self, is_alive, process};
 use crate::ports::raw;
 
 /// A port in the list of a service.
