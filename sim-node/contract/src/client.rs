@@ -2,7 +2,7 @@
 
 pub(crate) mod arrivals;
 pub(crate) mod change;
-mod forces;
+mod latch;
 pub(crate) mod loaded_scene;
 pub(crate) mod lockstep;
 pub(crate) mod membership;
@@ -23,13 +23,12 @@ use sim_messages::{
     TearsHeader, Torn, TornConstraint, Triangle, allowed_indices,
 };
 
-use crate::client::forces::{ForcesReader, Search};
+use crate::client::latch::{ForcesReader, Latch, Search};
 use crate::client::lockstep::{LockstepError, Member};
 use crate::client::request::{Commander, RequestError, random_client_id};
 use crate::client::views::{Bends, Colliders, Forces, Parameters, Snapshot, Surface, Topology};
 use crate::client::watch::Watch;
 use crate::endpoint::Endpoint;
-use crate::ports::latch::Latch;
 use crate::ports::reader::{ReadError, Reader};
 use crate::ports::service::{
     BENDS, COLLIDERS, PARAMETERS, PARTICLES, SCENE, STATUS, SURFACE, ServiceError, TEARS, TOPOLOGY,

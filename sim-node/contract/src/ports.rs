@@ -3,7 +3,6 @@
 
 pub(crate) mod connection;
 pub(crate) mod domain;
-pub(crate) mod latch;
 pub(crate) mod leftovers;
 pub(crate) mod memory;
 pub(crate) mod mirror;

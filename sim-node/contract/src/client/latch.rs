@@ -1,13 +1,49 @@
-//! The forces that a client reads: the newest ones, or those of a snapshot.
+//! Readers that keep a message, so that it can be read again: the newest one of a latched service, or the forces of a
+//! snapshot.
 
+use std::sync::Arc;
+
+use bytemuck::Pod;
+use iceoryx2::prelude::ZeroCopySend;
 use sim_messages::{ForceRow, ForcesHeader, SnapshotHeader};
 
 use crate::client::views::Forces;
+use crate::ports::port::{Header, Service};
 use crate::ports::reader::{ReadError, Reader, Sample};
-use crate::ports::service::{FORCES, ServiceError};
+use crate::ports::service::{FORCES, ServiceError, ServiceSpec};
 use crate::ports::services::Attachment;
+use crate::ports::source::Source;
 
-/// A reader that keeps the message that it read last.
+/// A reader that keeps its newest message.
+#[derive(Debug)]
+pub(crate) struct Latch<T, H> {
+    reader: Reader<T, H>,
+    kept: Option<Sample<T, H>>,
+}
+
+impl<T: Pod + ZeroCopySend, H: Header> Latch<T, H> {
+    pub(crate) fn create(
+        service: &Service<T, H>,
+        spec: &ServiceSpec,
+        owner: &Arc<Source>,
+    ) -> Result<Self, ServiceError> {
+        Ok(Self { reader: Reader::create(service, spec, owner)?, kept: None })
+    }
+
+    /// Returns the newest message; `None` if none has arrived yet. Then it asks an owner on another host.
+    pub(crate) fn newest(
+        &mut self,
+        attachment: &Attachment,
+    ) -> Result<Option<&Sample<T, H>>, ReadError> {
+        self.reader.replace_by_newest(&mut self.kept)?;
+        if self.kept.is_none() {
+            attachment.request_latched();
+        }
+        Ok(self.kept.as_ref())
+    }
+}
+
+/// A reader of forces that keeps the message that it read last.
 #[derive(Debug)]
 pub(crate) struct ForcesReader {
     reader: Reader<ForceRow, ForcesHeader>,
