@@ -15,9 +15,8 @@ mod world;
 use std::time::Duration;
 
 use anyhow::{Context, bail};
-use sim_contract::{
-    Client, ConstraintState, Endpoint, Parameter, RequestError, SnapshotHeader, Stop,
-};
+use sim_contract::{Client, ConstraintState, Endpoint, Parameter, RequestError, SnapshotHeader};
+use sim_host::Stop;
 use sim_solver::Scene;
 
 use balance::Balance;

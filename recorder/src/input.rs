@@ -9,7 +9,7 @@ use recording::{
     LogEnd, LogReader, Message, OutcomeRow, StepRow, TimedCommand, open_regular_file,
     parse_commands, recorded_scene, sort_commands,
 };
-use sim_contract::{Stop, read_scene_file, to_text};
+use sim_host::{Stop, read_scene_file, to_text};
 use sim_solver::Scene;
 use sim_solver::scene::LoadError;
 

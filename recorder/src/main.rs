@@ -79,7 +79,7 @@ fn main() -> Exit {
 }
 
 fn run(command: &Command) -> anyhow::Result<Exit> {
-    sim_contract::report_file_size_limit()?;
+    sim_host::report_file_size_limit()?;
     match command {
         Command::Check(args) => check::run(args),
         Command::Diff(args) => diff::run(args),

@@ -14,7 +14,7 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::parser::ValueSource;
 use clap::{ArgMatches, Command, CommandFactory, FromArgMatches, Parser, Subcommand};
 use sim_cli::DocumentVerb;
-use sim_contract::console;
+use sim_host::console;
 use sim_solver::builtin;
 use sim_solver::scene::is_path;
 

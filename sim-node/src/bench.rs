@@ -14,7 +14,8 @@ mod times;
 use std::io::{IsTerminal, stderr};
 
 use anyhow::anyhow;
-use sim_contract::{ScratchDomain, Stop, report_bus_errors};
+use sim_contract::ScratchDomain;
+use sim_host::{Stop, report_bus_errors};
 
 use crate::args::{BenchArgs, ClientRole};
 use crate::node::{Phase, PhaseTimes, RealTime};

@@ -10,7 +10,8 @@ pub(crate) mod status;
 mod watch;
 
 use anyhow::Context;
-use sim_contract::{CONSOLE_CLIENT_ID, Client, report_bus_errors};
+use sim_contract::{CONSOLE_CLIENT_ID, Client};
+use sim_host::report_bus_errors;
 
 use crate::args::{CtlArgs, CtlVerb, QueryVerb};
 use crate::output::Exit;

@@ -20,7 +20,7 @@ use output::Exit;
 
 fn main() -> Exit {
     let args = args::parse();
-    if let Err(error) = sim_contract::report_file_size_limit() {
+    if let Err(error) = sim_host::report_file_size_limit() {
         return output::from_result(Err(error.into()));
     }
     let result = match args.verb {

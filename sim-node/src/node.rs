@@ -17,8 +17,9 @@ mod warnings;
 
 use std::time::Duration;
 
-use sim_contract::clock::{SECOND_NS, monotonic_ns, sleep_until, thread_time_ns};
-use sim_contract::{Endpoint, NodeStatus, ReceivedCommand, Stop};
+use sim_contract::{Endpoint, NodeStatus, ReceivedCommand};
+use sim_host::Stop;
+use sim_host::clock::{SECOND_NS, monotonic_ns, sleep_until, thread_time_ns};
 use sim_solver::{Scene, Solver, Spare};
 
 use grab_connections::GrabConnections;

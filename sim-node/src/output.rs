@@ -5,7 +5,8 @@ use std::process::{ExitCode, Termination};
 
 use anyhow::Context;
 use serde::Serialize;
-use sim_contract::{console, printable, printable_line};
+use sim_contract::{printable, printable_line};
+use sim_host::console;
 
 /// Prints a result that ends with a newline.
 pub(crate) fn text(text: &str) -> anyhow::Result<()> {

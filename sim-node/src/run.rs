@@ -4,7 +4,8 @@ use std::io::{IsTerminal, Write, stderr};
 
 use anyhow::anyhow;
 use serde::Serialize;
-use sim_contract::{Endpoint, Stop, report_bus_errors};
+use sim_contract::Endpoint;
+use sim_host::{Stop, report_bus_errors};
 use sim_solver::{Scene, Solver};
 
 use crate::args::RunArgs;

@@ -1,6 +1,6 @@
 //! Reads scenes: built-in ones, and files.
 
-use sim_contract::read_scene_file;
+use sim_host::read_scene_file;
 use sim_solver::Scene;
 use sim_solver::scene::LoadError;
 

@@ -8,7 +8,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
 use rustix::process::{Pid, Resource, Rlimit, Signal, getrlimit, kill_process, prlimit, setrlimit};
-use sim_contract::{DOMAIN_VARIABLE, console};
+use sim_contract::DOMAIN_VARIABLE;
+use sim_host::console;
 
 use crate::finished::Finished;
 use crate::programs::Program;

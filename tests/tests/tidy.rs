@@ -16,15 +16,21 @@ const ARROWS: [(&str, &[&str]); 14] = [
     ("sim-messages", &["sim-types"]),
     ("sim-solver", &["sim-types"]),
     ("sim-contract", &["iceoryx2", "sim-host", "sim-messages"]),
-    ("sim-c", &["sim-contract"]),
-    ("catenary-python", &["recording", "sim-contract", "sim-solver"]),
-    ("sim-cli", &["sim-contract", "sim-types"]),
+    ("sim-c", &["sim-contract", "sim-host"]),
+    ("catenary-python", &["recording", "sim-contract", "sim-host", "sim-solver"]),
+    ("sim-cli", &["sim-host", "sim-types"]),
     ("sim-lessons", &["sim-solver"]),
-    ("sim-node", &["sim-cli", "sim-contract", "sim-lessons", "sim-solver"]),
-    ("recorder", &["mcap", "recording", "sim-cli", "sim-contract", "sim-solver"]),
-    ("recording", &["mcap", "sim-contract", "sim-solver"]),
-    ("viewer-bridge", &["foxglove", "recording", "sim-cli", "sim-contract", "sim-solver"]),
-    ("integration-tests", &["recording", "sim-contract", "sim-solver", "viewer-bridge"]),
+    ("sim-node", &["sim-cli", "sim-contract", "sim-host", "sim-lessons", "sim-solver"]),
+    ("recorder", &["mcap", "recording", "sim-cli", "sim-contract", "sim-host", "sim-solver"]),
+    ("recording", &["mcap", "sim-host", "sim-messages", "sim-solver"]),
+    (
+        "viewer-bridge",
+        &["foxglove", "recording", "sim-cli", "sim-contract", "sim-host", "sim-solver"],
+    ),
+    (
+        "integration-tests",
+        &["recording", "sim-contract", "sim-host", "sim-solver", "viewer-bridge"],
+    ),
 ];
 
 /// Words that do not begin a doc comment. It begins with a noun phrase or a third-person verb.

@@ -9,7 +9,7 @@ use std::net::TcpStream;
 use std::thread;
 
 use anyhow::Context;
-use sim_contract::clock::{SECOND_NS, monotonic_ns, sleep_until};
+use sim_host::clock::{SECOND_NS, monotonic_ns, sleep_until};
 use tungstenite::Message;
 use viewer_bridge::wire::Kind;
 

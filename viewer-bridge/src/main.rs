@@ -12,7 +12,7 @@ use std::task::Poll;
 
 use anyhow::{Context, anyhow};
 use clap::CommandFactory;
-use sim_contract::{Stop, console, report_bus_errors};
+use sim_host::{Stop, console, report_bus_errors};
 use tokio::runtime;
 use tokio::signal::unix::{SignalKind, signal};
 use viewer_bridge::message::Mode;
@@ -51,7 +51,7 @@ fn exit_with_usage(error: &clap::Error) -> ! {
 }
 
 fn run(args: &Args) -> anyhow::Result<()> {
-    sim_contract::report_file_size_limit()?;
+    sim_host::report_file_size_limit()?;
     if let Some(document) = &args.document {
         return document.run(Args::command());
     }

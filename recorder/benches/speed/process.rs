@@ -4,7 +4,7 @@ use std::fs;
 use std::process::{Child, Command, Stdio};
 
 use rustix::process::{Pid, WaitId, WaitIdOptions, waitid};
-use sim_contract::clock::monotonic_ns;
+use sim_host::clock::monotonic_ns;
 
 /// Times of `/proc` are multiples of this on every Linux of x86-64, in seconds.
 const TICK_S: f64 = 0.01;

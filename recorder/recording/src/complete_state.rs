@@ -2,7 +2,8 @@
 
 use std::io::Read;
 
-use sim_contract::{ParticleState, Stop, scene_hash};
+use sim_host::Stop;
+use sim_messages::{ParticleState, scene_hash};
 
 use super::log::{Frame, FrameReader, LogEnd, LogReader, Message, ReadError, Tape, TapeError};
 use super::scene_state::{RecordedSceneError, recorded_scene, scene_to_simulate};

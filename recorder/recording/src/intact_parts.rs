@@ -6,7 +6,8 @@ use std::path::Path;
 use std::sync::Arc;
 use std::thread::{self, JoinHandle};
 
-use sim_contract::{LoadHeader, Stop};
+use sim_host::Stop;
+use sim_messages::LoadHeader;
 use sim_solver::{Scene, Solver};
 
 use crate::log::{

@@ -7,7 +7,7 @@
 //! ```
 //! use recording::{Closing, FrameReader, LogOptions, LogReader, LogWriter, Message};
 //! use recording::{RunDescription, StepRow, Up};
-//! use sim_contract::ParticleState;
+//! use sim_messages::ParticleState;
 //!
 //! let run = RunDescription {
 //!     run_id: 1,
@@ -75,5 +75,5 @@ pub use scene_drawing::{DrawnMesh, SCENE_TOPIC, SceneDrawing};
 pub use scene_state::{
     RecordedSceneError, SceneState, SceneStateError, SceneStates, recorded_scene, scene_to_simulate,
 };
-pub use sim_contract::{Existing, PartFile, PartFileError};
+pub use sim_host::{Existing, PartFile, PartFileError};
 pub use sim_solver::scene::Up;

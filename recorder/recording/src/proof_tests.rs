@@ -16,7 +16,7 @@ use crate::log::{
     Closing, LogEnd, LogOptions, LogReader, LogWriter, Message, OutcomeRow, SceneColliders,
     TimedCommand, Topic, parse_commands,
 };
-use sim_contract::Action;
+use sim_messages::Action;
 use sim_solver::{SOLVER_VERSION, Scene, Solver, builtin};
 
 use crate::simulation::{Job, SimulationResult, States, simulate};

@@ -3,7 +3,7 @@
 mod solids;
 
 use prost::Message as _;
-use sim_contract::{ColliderState, ParticleState, TornConstraint};
+use sim_messages::{ColliderState, ParticleState, TornConstraint};
 use sim_solver::TornSides;
 use sim_solver::scene::ColliderMeshes;
 
@@ -173,7 +173,7 @@ fn entity(id: &str, time_ns: u64) -> SceneEntity {
 
 #[cfg(test)]
 mod tests {
-    use sim_contract::ColliderShape;
+    use sim_messages::ColliderShape;
     use sim_solver::scene::ColliderMesh;
 
     use super::*;

@@ -4,7 +4,7 @@ use std::io::Read;
 use std::str::Utf8Error;
 use std::sync::Arc;
 
-use sim_contract::{
+use sim_messages::{
     ColliderState, ConstraintState, ParameterValues, ParticleState, Torn, Triangle,
 };
 use sim_solver::scene::{ColliderMesh, ColliderMeshes, SceneError};

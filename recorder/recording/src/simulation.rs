@@ -7,7 +7,8 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use sim_contract::{Action, Existing, PartFile, PartFileError, Reason};
+use sim_host::{Existing, PartFile, PartFileError};
+use sim_messages::{Action, Reason};
 use sim_solver::{Applied, Scene, Solver};
 
 use super::log::{

@@ -10,7 +10,8 @@ use recording::{
     Closing, CompleteState, CompleteStateError, LogOptions, LogReader, LogWriter, Message, Tape,
     Topic, complete_state, parse_commands,
 };
-use sim_contract::{Stop, scene_hash};
+use sim_host::Stop;
+use sim_messages::scene_hash;
 use sim_solver::{Keyframe, Scene, Solver, builtin};
 
 const COMMANDS: &str = r#"

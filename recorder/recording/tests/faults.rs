@@ -9,7 +9,7 @@ use recording::{
     Closing, Compression, LogEnd, LogOptions, LogReader, LogWriter, Message, RunDescription,
     StepRow, Up, WriteError,
 };
-use sim_contract::ParticleState;
+use sim_messages::ParticleState;
 
 const EIO: i32 = 5;
 const EFBIG: i32 = 27;

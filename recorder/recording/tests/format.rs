@@ -9,7 +9,7 @@ use recording::{
     LoggedMessage, Message, OutcomeRow, ParametersRow, ReadError, RunDescription, StatusRow,
     StepRow, SurfaceRow, TearsRow, Topic, TopologyRow, Up, WriteError,
 };
-use sim_contract::{
+use sim_messages::{
     Action, BendState, ColliderState, Command, ConstraintState, LoadHeader, NodeStatus, Outcome,
     ParameterValues, ParticleState, Reason, Triangle,
 };

@@ -10,7 +10,7 @@ use recording::{
     Closing, IndexedLog, LogEnd, LogOptions, LogReader, LogWriter, LoggedMessage, Message,
     ReadError, RunDescription, StepRow, TearsRow, Topic, Up,
 };
-use sim_contract::ParticleState;
+use sim_messages::ParticleState;
 
 const STEPS: u64 = 200;
 

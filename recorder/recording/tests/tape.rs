@@ -13,7 +13,7 @@ use recording::{
     LogWriter, Message, OutcomeRow, RunDescription, StepRow, SurfaceRow, Tape, TapeError, TearsRow,
     TopologyRow, Up, state_hash,
 };
-use sim_contract::{
+use sim_messages::{
     Action, Command, ConstraintState, LoadHeader, Outcome, ParticleState, TearCause, TornConstraint,
 };
 use sim_solver::{Scene, Solver};

@@ -8,7 +8,8 @@ use std::thread::available_parallelism;
 
 use anyhow::bail;
 use recording::{Compression, Existing, LogOptions, LogWriter, PartFile};
-use sim_contract::{Endpoint, EndpointError, NAME_DEFAULT, part_path};
+use sim_contract::{Endpoint, EndpointError, NAME_DEFAULT};
+use sim_host::part_path;
 use sim_solver::THREADS_MAX;
 
 use super::parse::whole_number_in;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow};
 use recording::{FindStateError, IntactParts, LogEnd, ReadError, RepairError};
-use sim_contract::{Stop, is_being_written};
+use sim_host::{Stop, is_being_written};
 
 /// A truncated or damaged recording that lacks what a subcommand needs. The program ends with exit code 3.
 #[derive(Debug)]

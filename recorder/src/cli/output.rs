@@ -9,7 +9,8 @@ use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
 use recording::LogEnd;
 use serde::Serialize;
-use sim_contract::{console, is_being_written, printable, printable_line};
+use sim_contract::{printable, printable_line};
+use sim_host::{console, is_being_written};
 
 use super::damaged_input::DamagedInput;
 

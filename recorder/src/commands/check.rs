@@ -8,7 +8,8 @@ use recording::{
     CheckExtent, CheckReport, Finding, ReadError, check_file, counted, open_regular_file,
 };
 use serde::Serialize;
-use sim_contract::{Stop, printable_line};
+use sim_contract::printable_line;
+use sim_host::Stop;
 
 use crate::cli::output::{self, AsJson, Exit, progress_bytes};
 

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use recording::{FileSource, FrameReader, LogEnd, LogReader};
-use sim_contract::Stop;
+use sim_host::Stop;
 
 use crate::cli::damaged_input::lacks;
 use crate::cli::output::{self, AsJson, Exit, progress_spinner};

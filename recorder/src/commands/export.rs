@@ -29,7 +29,7 @@ use recording::pictures::{Bend, PictureOptions, Size, Style, View};
 use recording::{
     IntactParts, LogEnd, LogReader, ReadError, SceneState, SceneStates, open_regular_file,
 };
-use sim_contract::Stop;
+use sim_host::Stop;
 
 use crate::cli::args::{OverwriteArgs, refuse_own_input};
 use crate::cli::damaged_input::{intact_parts, lacks};

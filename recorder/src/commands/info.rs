@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use recording::pictures::encode_svg;
 use recording::{IntactParts, LogEnd, LogReader, Message, PartFile, ReadError};
-use sim_contract::Stop;
+use sim_host::Stop;
 
 use crate::cli::args::OverwriteArgs;
 use crate::cli::damaged_input::intact_parts;

@@ -16,8 +16,8 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use anyhow::bail;
-use sim_contract::clock::SECOND_NS;
-use sim_contract::{Stop, report_bus_errors};
+use sim_host::clock::SECOND_NS;
+use sim_host::{Stop, report_bus_errors};
 
 use crate::cli::args::EndpointArgs;
 use crate::cli::output::{self, Exit};

@@ -17,11 +17,11 @@ use std::time::Duration;
 
 use anyhow::{anyhow, bail};
 use recording::{Existing, PartFile, counted};
-use sim_contract::clock::{SECOND_NS, monotonic_ns, realtime_ns, sleep_until};
 use sim_contract::{
-    AttachError, Domain, Endpoint, LockstepError, NodeAnswer, OwnerState, SNAPSHOTS_BUFFERED, Stop,
-    Tap, console, report_bus_errors,
+    AttachError, Domain, Endpoint, LockstepError, NodeAnswer, OwnerState, SNAPSHOTS_BUFFERED, Tap,
 };
+use sim_host::clock::{SECOND_NS, monotonic_ns, realtime_ns, sleep_until};
+use sim_host::{Stop, console, report_bus_errors};
 
 use crate::cli::output::{self, Exit};
 pub(crate) use args::{RecordArgs, SingleStateArgs};

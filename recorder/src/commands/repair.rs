@@ -11,7 +11,8 @@ use recording::{
     open_regular_file, repair_file,
 };
 use serde::Serialize;
-use sim_contract::{Stop, is_being_written, printable_line};
+use sim_contract::printable_line;
+use sim_host::{Stop, is_being_written};
 
 use crate::cli::args::{OverwriteArgs, refuse_own_input};
 use crate::cli::output::{self, AsJson, Exit, progress_bytes};

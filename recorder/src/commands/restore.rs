@@ -8,7 +8,8 @@ use std::time::Duration;
 use anyhow::{Context, bail};
 use recording::{FindStateError, FrameReader, LogReader, Wanted, find_state, state_at_place};
 use serde::Serialize;
-use sim_contract::{Action, Client, GivenState, Outcome, Stop, report_bus_errors, scene_hash};
+use sim_contract::{Action, Client, GivenState, Outcome, scene_hash};
+use sim_host::{Stop, report_bus_errors};
 
 use crate::cli::args::{EndpointArgs, ThreadArgs};
 use crate::cli::damaged_input::{lacks, lacks_state};

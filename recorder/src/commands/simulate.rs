@@ -16,8 +16,9 @@ use recording::{
     ContentSelection, LogEnd, LogOptions, LogReader, OutcomeRow, PartFile, TimedCommand, WriteError,
 };
 use serde::Serialize;
-use sim_contract::clock::{SECOND_NS, monotonic_ns};
-use sim_contract::{Action, Outcome, Reason, Stop, allowed_indices, part_path, printable_line};
+use sim_contract::{Action, Outcome, Reason, allowed_indices, printable_line};
+use sim_host::clock::{SECOND_NS, monotonic_ns};
+use sim_host::{Stop, part_path};
 use sim_solver::{Scene, Solver};
 
 use crate::cli::args::{FileArgs, LogFile, ThreadArgs};

@@ -9,7 +9,8 @@ use recording::verification::{
     StepGap, StepRange, Verdict, VerifyError, VerifyOptions, VerifyReport, verify,
 };
 use recording::{IntactParts, LogEnd, LogReader, ReadError, Wanted, find_state};
-use sim_contract::{Stop, printable_line};
+use sim_contract::printable_line;
+use sim_host::Stop;
 
 use crate::cli::args::PartArgs;
 use crate::cli::damaged_input::{DamagedInput, intact_parts, lacks, lacks_state};

@@ -6,11 +6,11 @@ use std::ptr;
 use std::sync::{Arc, Mutex, TryLockError};
 use std::time::Duration;
 
-use sim_contract::clock::monotonic_ns;
 use sim_contract::{
     BendState, Client, ColliderState, ConstraintState, ForceRow, ParameterState, TornConstraint,
     Triangle,
 };
+use sim_host::clock::monotonic_ns;
 
 use crate::handles::Handles;
 use crate::outcome::{CatenaryResult, Failure, guard};

@@ -7,9 +7,9 @@ use std::{slice, thread};
 
 use crate::support::*;
 use catenary::*;
-use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::testing::TestDomain;
 use sim_contract::{Command, Outcome, Owner, Reason, Wake};
+use sim_host::clock::{SECOND_NS, monotonic_ns};
 
 fn assert_misuse(result: CatenaryResult, part: &str) {
     assert_eq!(result, CatenaryResult::Misuse);

@@ -11,7 +11,7 @@ use anyhow::Context;
 use clap::{Command, Subcommand};
 use clap_complete::Shell;
 use clap_mangen::Man;
-use sim_contract::console;
+use sim_host::console;
 
 pub use explain::{explain, subcommands};
 pub use sim_types::{did_you_mean, nearest};

@@ -80,10 +80,5 @@ pub use ports::service::ServiceError;
 pub use ports::services::AttachError;
 pub use ports::wake::Wake;
 pub use ports::writer::PublishError;
-pub use sim_host::{
-    Existing, PartFile, PartFileError, Stop, TextFileError, clock, console, explain_write_error,
-    is_being_written, kind_of_non_file, part_path, read_scene_file, report_bus_errors,
-    report_file_size_limit, to_text,
-};
 pub use sim_messages::*;
 pub use testing::ScratchDomain;

@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use pyo3::prelude::*;
-use sim_contract::clock::monotonic_ns;
 use sim_contract::{AttachError, Client, Endpoint};
+use sim_host::clock::monotonic_ns;
 
 use crate::error::attach_error;
 use crate::patience::Patience;
@@ -35,5 +35,5 @@ pub(crate) fn attach(
 
 fn pause(time: Duration) {
     let time_ns = u64::try_from(time.as_nanos()).unwrap_or(u64::MAX);
-    sim_contract::clock::sleep_until(monotonic_ns().saturating_add(time_ns));
+    sim_host::clock::sleep_until(monotonic_ns().saturating_add(time_ns));
 }

@@ -9,8 +9,8 @@ use std::time::Duration;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use recording::{CollidersRow, StatusRow};
-use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{Client, Endpoint, OwnerState, ReadError, Reason, RequestError, SnapshotHeader};
+use sim_host::clock::{SECOND_NS, monotonic_ns};
 
 use crate::arguments;
 use crate::attach::attach;

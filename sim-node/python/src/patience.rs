@@ -7,8 +7,8 @@ use std::time::Duration;
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use sim_contract::Stop;
-use sim_contract::clock::monotonic_ns;
+use sim_host::Stop;
+use sim_host::clock::monotonic_ns;
 
 use crate::error::Error;
 

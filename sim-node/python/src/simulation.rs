@@ -9,10 +9,10 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use recording::simulation::{SteppedRecording, apply, colliders_row, forces_row, recording_bytes};
 use recording::{Existing, RunDescription, SceneState, bend_state, constraint_state};
-use sim_contract::clock::monotonic_ns;
 use sim_contract::{
     LoadHeader, ParticleState, RestoreContents, SnapshotHeader, Triangle, scene_hash,
 };
+use sim_host::clock::monotonic_ns;
 use sim_solver::{Applied, EnergyMeter, Reason, RestoreError, SOLVER_VERSION, Scene, Solver};
 
 use crate::arguments;

@@ -7,7 +7,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use recording::verification::{Difference, StepRange, Verdict, VerifyOptions, VerifyReport};
 use recording::{LogReader, Wanted, find_state};
-use sim_contract::Stop;
+use sim_host::Stop;
 
 use crate::arguments;
 use crate::error::recording_error;

@@ -9,8 +9,9 @@ use std::time::Duration;
 
 use anyhow::Context;
 use serde::{Deserialize, Serialize};
-use sim_contract::clock::{SECOND_NS, monotonic_ns};
-use sim_contract::{Action, Client, RequestError, Snapshot, console, report_bus_errors};
+use sim_contract::{Action, Client, RequestError, Snapshot};
+use sim_host::clock::{SECOND_NS, monotonic_ns};
+use sim_host::{console, report_bus_errors};
 
 use super::times::{SampleList, Samples};
 use crate::args::{BenchClientArgs, ClientRole};

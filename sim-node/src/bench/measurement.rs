@@ -7,8 +7,9 @@ use std::time::Duration;
 
 use anyhow::{Context, ensure};
 use serde::Serialize;
-use sim_contract::clock::{SECOND_NS, monotonic_ns, sleep_until};
-use sim_contract::{ScratchDomain, Stop};
+use sim_contract::ScratchDomain;
+use sim_host::Stop;
+use sim_host::clock::{SECOND_NS, monotonic_ns, sleep_until};
 use sim_solver::{Scene, Solver};
 
 use super::children::Children;

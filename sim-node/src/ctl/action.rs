@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use anyhow::{Context, anyhow};
 use serde_json::Value;
-use sim_contract::clock::SECOND_NS;
 use sim_contract::{Action, MovedObject, PathError, PathPoint};
+use sim_host::clock::SECOND_NS;
 
 use crate::args::CommandVerb;
 use crate::scene_source;

@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use anyhow::{Context, bail};
 use serde::Serialize;
-use sim_contract::clock::monotonic_ns;
 use sim_contract::{Action, COMMANDS_BUFFERED, Client, Outcome};
+use sim_host::clock::monotonic_ns;
 
 use super::explanation;
 use crate::args::CtlArgs;

@@ -6,8 +6,8 @@ use std::time::Duration;
 use anyhow::{Context, bail};
 use bytemuck::cast_slice;
 use serde::Serialize;
-use sim_contract::clock::monotonic_ns;
 use sim_contract::{Client, MemberStatus, NodeStatus, State, Tap};
+use sim_host::clock::monotonic_ns;
 use sim_solver::{Energy, EnergyMeter, Scene};
 
 use crate::args::CtlArgs;

@@ -3,10 +3,9 @@
 use std::time::Duration;
 
 use anyhow::{Context, bail};
-use sim_contract::clock::{monotonic_ns, sleep_until};
-use sim_contract::{
-    AttachError, CONSOLE_CLIENT_ID, Client, Endpoint, MemberChanges, NodeStatus, Stop, console,
-};
+use sim_contract::{AttachError, CONSOLE_CLIENT_ID, Client, Endpoint, MemberChanges, NodeStatus};
+use sim_host::clock::{monotonic_ns, sleep_until};
+use sim_host::{Stop, console};
 
 use crate::args::{CtlArgs, WatchArgs};
 use crate::ctl::status::StatusRow;

@@ -1,11 +1,11 @@
 //! The boundary before a step: applies commands, and releases the grabs of lost clients.
 
 use bytemuck::cast_slice;
-use sim_contract::clock::monotonic_ns;
 use sim_contract::{
     Action, CLIENT_ID_END, COMMANDS_PER_STEP_MAX, Command, Reason, ReceivedState, RestoreContents,
-    Stop,
 };
+use sim_host::Stop;
+use sim_host::clock::monotonic_ns;
 use sim_solver::{Applied, Control, Keyframe, Particle};
 
 use super::history::Target;

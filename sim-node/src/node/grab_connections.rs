@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use sim_contract::clock::SECOND_NS;
 use sim_contract::{
     Action, COMMANDS_PER_STEP_MAX, CONSOLE_CLIENT_ID, Command, ConnectionId, ReceivedCommand,
     RestoreContents,
 };
+use sim_host::clock::SECOND_NS;
 
 /// Time between two checks of the connections. A check reads the state of every client from files.
 const CHECK_PERIOD_NS: u64 = SECOND_NS / 5;

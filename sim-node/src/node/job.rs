@@ -7,7 +7,8 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError, sync_channel};
 use std::thread;
 use std::time::Duration;
 
-use sim_contract::{LoadPreparer, Reason, Stop};
+use sim_contract::{LoadPreparer, Reason};
+use sim_host::Stop;
 use sim_solver::{Prepared, Scene, Solver};
 
 use super::inbox::Request;

@@ -3,8 +3,9 @@
 use std::mem;
 
 use anyhow::Context;
-use sim_contract::clock::monotonic_ns;
-use sim_contract::{Command, OwnerError, Reason, Stop, Text};
+use sim_contract::{Command, OwnerError, Reason, Text};
+use sim_host::Stop;
+use sim_host::clock::monotonic_ns;
 use sim_solver::Applied;
 
 use super::inbox::Request;

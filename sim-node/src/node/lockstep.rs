@@ -4,10 +4,10 @@ use std::hint::spin_loop;
 use std::thread::yield_now;
 use std::time::Duration;
 
-use sim_contract::clock::{SECOND_NS, monotonic_ns, sleep_until};
 use sim_contract::{
     ConnectionId, MEMBERS_MAX, MemberChange, MemberChangeKind, MemberChanges, MemberStatus, Ready,
 };
+use sim_host::clock::{SECOND_NS, monotonic_ns, sleep_until};
 
 use super::publisher::Publisher;
 

@@ -5,7 +5,7 @@
 //! stall (a suspended process) does not end in a burst of steps. A loop with real-time scheduling rests, and a node that makes
 //! no step looks for commands in between.
 
-use sim_contract::clock::SECOND_NS;
+use sim_host::clock::SECOND_NS;
 
 /// Most lateness that the node catches up: a quarter of a second, or four periods if that is longer.
 const CATCH_UP_NS_MAX: u64 = SECOND_NS / 4;

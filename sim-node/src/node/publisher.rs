@@ -9,13 +9,13 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use bytemuck::cast_slice;
-use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{
     CONTRACT_VERSION, ColliderState, CollidersHeader, Command, ConnectionId, Endpoint,
     ForcesHeader, KeyframeHeader, LoadPreparer, OUTCOME_FLAG_DISCONNECTED, Outcome, Owner,
     OwnerError, Parameter, ParameterValues, ParticleState, Ready, Reason, ReceivedCommand,
     SnapshotFlags, SnapshotHeader, TearsHeader, TornConstraint, Wake,
 };
+use sim_host::clock::{SECOND_NS, monotonic_ns};
 use sim_solver::{Applied, SOLVER_VERSION, Scene, Solver};
 
 use super::inbox::Given;

@@ -2,7 +2,7 @@
 
 use anyhow::Context;
 use hdrhistogram::Histogram;
-use sim_contract::clock::{SECOND_NS, monotonic_ns};
+use sim_host::clock::{SECOND_NS, monotonic_ns};
 
 /// Longest time that the histograms resolve: a minute.
 pub(crate) const TIME_NS_MAX: u64 = 60 * SECOND_NS;

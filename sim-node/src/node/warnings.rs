@@ -1,6 +1,6 @@
 //! Warnings and notes of a running node, limited so that no client can delay it by causing them.
 
-use sim_contract::clock::{SECOND_NS, monotonic_ns};
+use sim_host::clock::{SECOND_NS, monotonic_ns};
 
 use crate::output;
 

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use anyhow::{Context, anyhow};
-use sim_contract::{Existing, PartFile, read_scene_file};
+use sim_host::{Existing, PartFile, read_scene_file};
 use sim_solver::scene::SceneProblem;
 use sim_solver::{Scene, SceneError};
 

@@ -12,9 +12,10 @@ use std::time::Duration;
 
 use anyhow::{Context, bail};
 use integration_tests::{Finished, Process, Program, build_products, build_products_and_bodies};
-use sim_contract::clock::{SECOND_NS, realtime_ns};
-use sim_contract::console::{note, write_result};
-use sim_contract::{Client, DOMAIN_VARIABLE, Endpoint, Stop};
+use sim_contract::{Client, DOMAIN_VARIABLE, Endpoint};
+use sim_host::Stop;
+use sim_host::clock::{SECOND_NS, realtime_ns};
+use sim_host::console::{note, write_result};
 
 /// Limit on each wait for a status of the node, so that the demo notices Ctrl-C.
 const POLL: Duration = Duration::from_millis(200);

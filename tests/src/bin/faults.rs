@@ -6,7 +6,7 @@
 use anyhow::{Context, bail};
 use integration_tests::faults;
 use integration_tests::storm::{self, Counts, Storm, Summary};
-use sim_contract::Stop;
+use sim_host::Stop;
 
 /// The text of `--help`.
 const HELP: &str = "Perform random actions on a node, recorders, a viewer and clients: start, kill, stop, flood, clean.

@@ -7,7 +7,8 @@ use std::collections::VecDeque;
 use std::error::Error;
 use std::time::Duration;
 
-use sim_contract::{BORROWED_SAMPLES_MAX, Client, Endpoint, Stop};
+use sim_contract::{BORROWED_SAMPLES_MAX, Client, Endpoint};
+use sim_host::Stop;
 
 /// Longest wait for a snapshot before the next check for a signal.
 const WAIT_MAX: Duration = Duration::from_millis(50);

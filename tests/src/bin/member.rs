@@ -10,7 +10,8 @@ use std::num::NonZeroU32;
 use std::time::Duration;
 
 use integration_tests::DEADLINE;
-use sim_contract::{Action, Client, Endpoint, RequestError, SnapshotHeader, Stop};
+use sim_contract::{Action, Client, Endpoint, RequestError, SnapshotHeader};
+use sim_host::Stop;
 
 /// Longest wait for a turn before the next check for a signal.
 const WAIT_MAX: Duration = Duration::from_millis(50);

@@ -6,8 +6,9 @@ use std::error::Error;
 use std::time::Duration;
 
 use sim_contract::{
-    Client, Endpoint, GivenState, Outcome, ParticleState, Reason, RequestError, Stop, Tap, Update,
+    Client, Endpoint, GivenState, Outcome, ParticleState, Reason, RequestError, Tap, Update,
 };
+use sim_host::Stop;
 
 /// Longest wait for a message or an outcome before the next check for a signal.
 const WAIT_MAX: Duration = Duration::from_millis(50);

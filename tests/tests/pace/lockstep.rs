@@ -8,8 +8,8 @@ use std::thread;
 use fastrand::Rng;
 use integration_tests::{DEADLINE, Process, Program, Sandbox, Signal, ctl, wait_for};
 use recording::{LogReader, Message};
-use sim_contract::clock::{monotonic_ns, sleep_until};
 use sim_contract::{Action, Client, Endpoint, GivenState, RequestError, Snapshot, SnapshotFlags};
+use sim_host::clock::{monotonic_ns, sleep_until};
 
 const STEPS: u64 = 120;
 

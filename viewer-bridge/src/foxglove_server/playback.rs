@@ -75,7 +75,7 @@ pub(super) fn present_state(
 
 #[cfg(test)]
 mod tests {
-    use sim_contract::clock::SECOND_NS;
+    use sim_host::clock::SECOND_NS;
 
     use super::*;
 

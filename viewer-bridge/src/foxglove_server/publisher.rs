@@ -13,7 +13,7 @@ use recording::{
     SceneDrawing, StatusRow, StepRow, SurfaceRow, TearsRow, Topic, TopicFormat, TopologyRow, Up,
     encode_transform, scene_format,
 };
-use sim_contract::clock::{SECOND_NS, monotonic_ns, realtime_ns};
+use sim_host::clock::{SECOND_NS, monotonic_ns, realtime_ns};
 
 use crate::sink::{State, Topology, Torn};
 use crate::source::recording_times::RecordingTimes;

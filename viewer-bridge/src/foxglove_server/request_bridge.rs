@@ -12,8 +12,8 @@ use foxglove::websocket::{
     AnyClient, Client, ClientId as LibraryClientId, Parameter, PlaybackControlRequest,
     PlaybackState, SetParametersResponder, Status as LibraryStatus,
 };
-use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{Action, Parameter as Name, ParameterValues, Reason};
+use sim_host::clock::{SECOND_NS, monotonic_ns};
 
 use super::{parameters, playback};
 use crate::message::{Command, OutcomeText, Playback, Refusal, Status, parse_published};

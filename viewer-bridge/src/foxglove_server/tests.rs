@@ -11,8 +11,8 @@ use foxglove::{
 use prost_types::{FileDescriptorProto, FileDescriptorSet};
 use recording::{StepRow, Topic, TopicFormat, scene_format};
 use serde_json::{Value, json};
-use sim_contract::clock::SECOND_NS;
 use sim_contract::{ColliderShape, ColliderState, ParticleState, TornConstraint};
+use sim_host::clock::SECOND_NS;
 use sim_solver::scene::ColliderMesh;
 
 use super::publisher::Publisher;

@@ -1,7 +1,7 @@
 //! The newest state, as pages receive it.
 
 use bytes::Bytes;
-use sim_contract::clock::{SECOND_NS, monotonic_ns};
+use sim_host::clock::{SECOND_NS, monotonic_ns};
 
 use crate::limits::F32_PARTICLES_MAX;
 use crate::message::Choice;

@@ -12,8 +12,8 @@ use std::thread::{self, JoinHandle};
 
 use anyhow::Context;
 use sim_contract::Endpoint;
-use sim_contract::clock::realtime_ns;
-use sim_contract::console::note;
+use sim_host::clock::realtime_ns;
+use sim_host::console::note;
 
 use super::hub::{Hub, lock};
 use crate::message::{NodeState, RecordingState, RecordingText, Refusal};

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 
-use sim_contract::Stop;
-use sim_contract::console::note;
+use sim_host::Stop;
+use sim_host::console::note;
 use tokio::sync::OnceCell;
 use tokio::task::spawn_blocking;
 

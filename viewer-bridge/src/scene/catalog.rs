@@ -6,7 +6,8 @@ use std::path::{self, Path};
 
 use anyhow::{Context, bail};
 use serde::Serialize;
-use sim_contract::{Text, read_scene_file};
+use sim_contract::Text;
+use sim_host::read_scene_file;
 use sim_solver::scene::is_path;
 use sim_solver::{Scene, builtin};
 

@@ -151,7 +151,7 @@ mod tests {
     use std::time::Duration;
 
     use futures_util::FutureExt;
-    use sim_contract::clock::monotonic_ns;
+    use sim_host::clock::monotonic_ns;
 
     use super::*;
 

@@ -14,9 +14,9 @@ mod undo;
 use std::sync::Arc;
 use std::time::Duration;
 
-use sim_contract::clock::monotonic_ns;
-use sim_contract::console::note;
 use sim_contract::{AttachError, Endpoint};
+use sim_host::clock::monotonic_ns;
+use sim_host::console::note;
 
 use super::Source;
 use crate::message::{Mode, Node, NodeState, OutcomeText, ParametersText, Refusal};

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, UNIX_EPOCH};
 use std::{fs, io};
 
-use sim_contract::part_path;
+use sim_host::part_path;
 
 use crate::limits::RECORDINGS_LISTED_MAX;
 

@@ -1,7 +1,7 @@
 //! Times of the steps of a recording.
 
 use recording::RunDescription;
-use sim_contract::clock::SECOND_NS;
+use sim_host::clock::SECOND_NS;
 
 /// Times of the steps of a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

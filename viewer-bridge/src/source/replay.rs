@@ -20,7 +20,7 @@ use std::thread;
 
 use anyhow::Context;
 use recording::ReadError;
-use sim_contract::Stop;
+use sim_host::Stop;
 
 use super::Source;
 use crate::message::Mode;

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use sim_contract::TornConstraint;
-use sim_contract::clock::{SECOND_NS, monotonic_ns, sleep_until};
+use sim_host::clock::{SECOND_NS, monotonic_ns, sleep_until};
 use viewer_bridge::limits::{FRAMES_UNACKNOWLEDGED_MAX, SILENCE_MAX};
 use viewer_bridge::message::Node;
 use viewer_bridge::pages::hub::Formats;

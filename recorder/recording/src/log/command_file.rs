@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 use serde_json::{Map, Value};
-use sim_contract::{
+use sim_messages::{
     ACTIONS, Action, ActionInfo, FieldForm, FieldInfo, MOTION_POINTS_MAX, MovedObject, PathError,
     PathPart, PathPoint, PlainF32, RestoreContents, Text,
 };

@@ -9,7 +9,7 @@ use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
 use serde::Serialize;
 use serde_json::{Map, Value};
-use sim_contract::ParticleState;
+use sim_messages::ParticleState;
 
 use super::message::Message;
 use super::rows::{

@@ -15,7 +15,7 @@ use std::sync::Arc;
 
 use mcap::records::{Record, op};
 
-use sim_contract::Stop;
+use sim_host::Stop;
 
 use super::input_file::{FileSource, open_recording};
 use super::read::decode::{LoggedMessage, MessageDecoder};

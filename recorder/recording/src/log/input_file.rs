@@ -7,7 +7,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use rustix::fs::OFlags;
-use sim_contract::{kind_of_non_file, part_path};
+use sim_host::{kind_of_non_file, part_path};
 
 use super::read_error::ReadError;
 

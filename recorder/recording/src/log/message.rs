@@ -1,6 +1,6 @@
 //! One message of a recording on any topic, the order of messages, and the memory of those that wait for their snapshot.
 
-use sim_contract::ParticleState;
+use sim_messages::ParticleState;
 
 use super::rows::{
     ColliderRow, CollidersRow, EventRow, ForcesRow, OutcomeRow, ParametersRow, StatusRow, StepRow,

@@ -4,7 +4,7 @@ use std::fmt;
 use std::io;
 use std::path::PathBuf;
 
-use sim_contract::Stop;
+use sim_host::Stop;
 
 use super::run::FORMAT_VERSION;
 

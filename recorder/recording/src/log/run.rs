@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::str::FromStr;
 
-use sim_contract::{ELEMENTS_MAX, LoadHeader};
+use sim_messages::{ELEMENTS_MAX, LoadHeader};
 use sim_solver::scene::Up;
 
 use super::rows::TopologyRow;

@@ -7,7 +7,8 @@ use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
 
-use sim_contract::{ParticleState, Stop, Torn};
+use sim_host::Stop;
+use sim_messages::{ParticleState, Torn};
 
 use super::index::IndexedLog;
 use super::input_file::{FileSource, open_recording};

@@ -1,6 +1,6 @@
 //! The torn constraints, tracked through the messages of a recording, and the state hash, whose seed they are.
 
-use sim_contract::{ParticleState, Torn, TornConstraint};
+use sim_messages::{ParticleState, Torn, TornConstraint};
 use sim_solver::Keyframe;
 use xxhash_rust::xxh3::{xxh3_64, xxh3_64_with_seed};
 
@@ -198,7 +198,7 @@ impl HashSeeds {
 
 #[cfg(test)]
 mod tests {
-    use sim_contract::{Action, Command, Outcome, TearCause, TearsHeader};
+    use sim_messages::{Action, Command, Outcome, TearCause, TearsHeader};
     use sim_solver::{Scene, Solver, builtin};
 
     use super::*;
@@ -263,7 +263,7 @@ mod tests {
         let causes = |torn: &[u32], bytes: Vec<u8>| {
             let topology = TopologyRow {
                 torn: torn.to_vec(),
-                ..TopologyRow::new(&sim_contract::LoadHeader::default(), &[], &[])
+                ..TopologyRow::new(&sim_messages::LoadHeader::default(), &[], &[])
             };
             let first = Frame {
                 updates: vec![Message::Keyframe { step: 1, bytes }],

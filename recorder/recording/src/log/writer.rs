@@ -9,7 +9,7 @@ use std::io::{self, Read, Write};
 
 use mcap::records::{AttachmentHeader, MessageHeader, Metadata};
 use mcap::{Attachment, WriteOptions, Writer};
-use sim_contract::explain_write_error;
+use sim_host::explain_write_error;
 
 use super::encoding::{MessageEncoder, ParticleBuffer, TopicFormat, encode_transform};
 use super::message::Message;

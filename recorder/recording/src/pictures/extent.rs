@@ -2,7 +2,7 @@
 //! outliers.
 
 use glam::{DQuat, DVec3};
-use sim_contract::{ParticleState, PlainF32};
+use sim_messages::{ParticleState, PlainF32};
 use sim_solver::scene::ColliderMesh;
 
 use crate::log::ShapeRow;

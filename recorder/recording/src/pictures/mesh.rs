@@ -4,7 +4,7 @@
 //! triangle that touches it, so that nearer triangles hide it and its own surface does not.
 
 use glam::{DVec2, DVec3};
-use sim_contract::{ConstraintKind, ParticleFlags};
+use sim_messages::{ConstraintKind, ParticleFlags};
 
 use super::camera::Camera;
 use super::extent::position;

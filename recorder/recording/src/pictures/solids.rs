@@ -183,7 +183,7 @@ fn clip(corners: &[DVec3], axis: DVec3, limit: f64) -> Vec<DVec3> {
 #[cfg(test)]
 mod tests {
     use glam::DVec2;
-    use sim_contract::PlainF32;
+    use sim_messages::PlainF32;
     use sim_solver::scene::Up;
 
     use super::*;

@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 
 use crate::log::{LogReader, Message, OutcomeRow, parse_commands};
 use serde_json::json;
-use sim_contract::{ACTIONS, ActionInfo, PARAMETERS, ParameterInfo};
+use sim_messages::{ACTIONS, ActionInfo, PARAMETERS, ParameterInfo};
 use sim_solver::Scene;
 
 use super::{ALL, check, rebuild, record};

@@ -14,7 +14,7 @@ use crate::log::{
 };
 use mcap::records::op;
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader};
-use sim_contract::NodeStatus;
+use sim_messages::NodeStatus;
 use sim_solver::{Keyframe, Scene, Solver};
 
 use json::{Change, json_edits};

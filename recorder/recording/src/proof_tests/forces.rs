@@ -3,7 +3,7 @@
 use std::sync::atomic::AtomicBool;
 
 use crate::log::{ContentSelection, ForcesRow, LogOptions, LogWriter, Message, SceneColliders};
-use sim_contract::PlainF32;
+use sim_messages::PlainF32;
 use sim_solver::Solver;
 
 use super::commands::{COMMANDS, STEPS, collect, job};

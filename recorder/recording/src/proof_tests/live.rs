@@ -1,6 +1,6 @@
 //! Rows that only a recording of a node has: it verifies with them, and not with wrong ones.
 
-use sim_contract::Parameter;
+use sim_messages::Parameter;
 
 use crate::log::{LogOptions, LogReader, LogWriter, Message};
 

@@ -4,7 +4,7 @@
 use crate::log::{
     BendColumns, ColliderBodyRow, ColliderDetails, Message, SceneColliders, TearsRow, TopologyRow,
 };
-use sim_contract::{BlockValue, Parameter, ParticleFlags, PlainF32};
+use sim_messages::{BlockValue, Parameter, ParticleFlags, PlainF32};
 use sim_solver::Scene;
 
 use super::commands::{COMMANDS, SCENE, STEPS, collect, job, job_of};

@@ -1,6 +1,6 @@
 //! The drawing of the colliders: cubes, spheres, cylinders, triangles, and the edges of bounds.
 
-use sim_contract::{ColliderShape, ColliderState};
+use sim_messages::{ColliderShape, ColliderState};
 use sim_solver::scene::{ColliderMesh, ColliderMeshes};
 
 use crate::log::encoding::protobuf::{Pose, Quaternion, Vector3};

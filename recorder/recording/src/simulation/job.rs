@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use sim_contract::{Action, CONTRACT_VERSION, Command, Outcome, Reason, RestoreContents};
+use sim_messages::{Action, CONTRACT_VERSION, Command, Outcome, Reason, RestoreContents};
 use sim_solver::{Applied, Control, Keyframe, Particle, SOLVER_VERSION, Scene, Solver};
 use xxhash_rust::xxh3::Xxh3;
 

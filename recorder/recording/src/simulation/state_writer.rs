@@ -2,7 +2,7 @@
 
 use std::io::Write;
 
-use sim_contract::{
+use sim_messages::{
     ColliderState, LoadHeader, Outcome, ParameterValues, ParticleFlags, ParticleState, PlainF32,
     Reason,
 };

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use serde::Serialize;
-use sim_contract::ParticleState;
+use sim_messages::ParticleState;
 
 use crate::log::Frame;
 

@@ -6,7 +6,7 @@ use std::sync::mpsc::{Receiver, Sender, SyncSender, TryIter, channel, sync_chann
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::thread::{Builder, Scope};
 
-use sim_contract::ParticleState;
+use sim_messages::ParticleState;
 use sim_solver::Solver;
 
 use super::finding::{SnapshotFinding, StepGap};

@@ -1,6 +1,6 @@
 //! Digests of simulated states, to prove those that a command puts in place again.
 
-use sim_contract::Action;
+use sim_messages::Action;
 use sim_solver::Solver;
 use xxhash_rust::xxh3::xxh3_64;
 

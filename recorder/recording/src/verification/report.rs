@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use serde::{Serialize, Serializer};
-use sim_contract::printable_line;
+use sim_messages::printable_line;
 
 use super::finding::{Difference, SnapshotFinding, StepGap};
 use super::part::PartResult;

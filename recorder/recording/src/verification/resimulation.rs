@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::sync::atomic::AtomicBool;
 
 use crate::log::{EnergyRow, Frame, Message, OutcomeRow, StepRow, TearTracker, Topic};
-use sim_contract::{Action, Outcome, ParticleState, RestoreContents};
+use sim_messages::{Action, Outcome, ParticleState, RestoreContents};
 use sim_solver::{Applied, Control, EnergyMeter, Keyframe, Scene, Solver};
 
 use super::finding::{Difference, SnapshotFinding, StepGap, first_difference};

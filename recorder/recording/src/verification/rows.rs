@@ -3,7 +3,7 @@
 
 use std::io::Read;
 
-use sim_contract::{ForceKind, ForceRow, LoadHeader, Parameter, Part, Setting};
+use sim_messages::{ForceKind, ForceRow, LoadHeader, Parameter, Part, Setting};
 use sim_solver::{Keyframe, Scene, Solver};
 
 use crate::log::{

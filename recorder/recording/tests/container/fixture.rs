@@ -7,7 +7,7 @@ use recording::{
     Closing, Compression, ContentSelection, LogOptions, LogWriter, Message, OutcomeRow,
     ParametersRow, RunDescription, StepRow, SurfaceRow, TearsRow, Topic, TopologyRow, Up,
 };
-use sim_contract::{Action, Command, ConstraintState, LoadHeader, Outcome, TornConstraint};
+use sim_messages::{Action, Command, ConstraintState, LoadHeader, Outcome, TornConstraint};
 use sim_solver::{SOLVER_VERSION, Scene, Solver, builtin};
 
 /// The last step of a recording.
@@ -181,7 +181,7 @@ fn simulate(scene: &Scene) -> Vec<Message> {
             let outcome = Outcome::new(outcome_count, step, command, result.map(drop));
             outcome_count += 1;
             let torn =
-                torn.map(|index| [TornConstraint::new(index, Some(sim_contract::TearCause::Cut))]);
+                torn.map(|index| [TornConstraint::new(index, Some(sim_messages::TearCause::Cut))]);
             messages.extend(torn.map(|torn| Message::Tears(TearsRow::new(step, &torn))));
             messages.push(Message::Outcome(OutcomeRow::from(&outcome)));
         }

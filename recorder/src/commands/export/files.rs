@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, anyhow, bail};
 use recording::pictures::{Picture, encode_png, encode_svg};
 use recording::{Existing, PartFile};
-use sim_contract::{console, explain_write_error};
+use sim_host::{console, explain_write_error};
 
 /// A file that keeps the first error of writing, which a format may wrap or take for one of its input.
 struct ObservedFile<'a> {

@@ -13,8 +13,8 @@ use rustix::termios::{
 use rustix::time::Timespec;
 use signal_hook::consts::SIGCONT;
 use signal_hook::iterator::{Handle, Signals};
-use sim_contract::Stop;
-use sim_contract::clock::SECOND_NS;
+use sim_host::Stop;
+use sim_host::clock::SECOND_NS;
 
 use super::control::{Control, Request, SeekTarget};
 

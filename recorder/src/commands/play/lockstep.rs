@@ -1,7 +1,7 @@
 //! The lockstep of a replay: readers that it waits for, so that they miss no snapshot.
 
-use sim_contract::clock::SECOND_NS;
 use sim_contract::{ConnectionId, MEMBERS_MAX, MemberStatus, Owner, Ready};
+use sim_host::clock::SECOND_NS;
 
 use crate::cli::output;
 

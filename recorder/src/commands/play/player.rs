@@ -3,8 +3,9 @@
 use std::collections::VecDeque;
 
 use recording::Frame;
-use sim_contract::clock::{SECOND_NS, monotonic_ns, sleep_until};
-use sim_contract::{Action, Command, Endpoint, Owner, Reason, ReceivedCommand, Stop};
+use sim_contract::{Action, Command, Endpoint, Owner, Reason, ReceivedCommand};
+use sim_host::Stop;
+use sim_host::clock::{SECOND_NS, monotonic_ns, sleep_until};
 
 use super::control::{Control, Pace, Request, SeekTarget};
 use super::keyboard::{Key, Keyboard};

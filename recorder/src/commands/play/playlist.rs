@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use recording::{ContentSelection, Frame, LogEnd, RunDescription, StepRow, counted};
-use sim_contract::Stop;
-use sim_contract::clock::SECOND_NS;
+use sim_host::Stop;
+use sim_host::clock::SECOND_NS;
 
 use super::position::Position;
 use super::recording::{Recording, Start};

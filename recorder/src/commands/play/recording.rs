@@ -9,7 +9,8 @@ use recording::{
     LogReader, Message, RecordedSceneError, RunDescription, StepRow, Tape, complete_state, counted,
     open_recording, recorded_scene, torn_before_first,
 };
-use sim_contract::{BendState, Stop};
+use sim_contract::BendState;
+use sim_host::Stop;
 use sim_solver::Solver;
 
 use super::position::Position;

@@ -6,13 +6,13 @@ use anyhow::{Context, bail};
 use recording::{
     CollidersRow, ForcesRow, Frame, Message, RunDescription, StatusRow, SurfaceRow, TopologyRow,
 };
-use sim_contract::clock::monotonic_ns;
 use sim_contract::{
     BendState, CONTRACT_VERSION, CollidersHeader, Command, Endpoint, ForcesHeader, KeyframeHeader,
     Load, LoadHeader, NodeStatus, OUTCOME_FLAG_CONTROL, Outcome, Owner, OwnerError,
     ParameterValues, Reason, ReceivedCommand, SnapshotFlags, SnapshotHeader, StatusFlags,
     TearsHeader, Torn, Wake,
 };
+use sim_host::clock::monotonic_ns;
 
 use super::control::Control;
 use super::lockstep::{Lockstep, Published};

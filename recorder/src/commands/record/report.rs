@@ -9,8 +9,8 @@ use std::sync::Arc;
 use anyhow::Context;
 use recording::{AllCounts, Closing, Topic, counted};
 use serde::Serialize;
-use sim_contract::clock::{SECOND_NS, monotonic_ns};
-use sim_contract::console;
+use sim_host::clock::{SECOND_NS, monotonic_ns};
+use sim_host::console;
 
 use super::queue::Queue;
 use super::split::WritePosition;

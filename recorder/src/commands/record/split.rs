@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use rustix::fs::statvfs;
 use sim_contract::SnapshotHeader;
-use sim_contract::clock::SECOND_NS;
+use sim_host::clock::SECOND_NS;
 
 use crate::cli::parse::{self, size_bytes};
 

@@ -6,8 +6,8 @@ pub(crate) mod trigger;
 use std::sync::Arc;
 
 use recording::{AllCounts, Closing, ContentSelection, RunDescription, counted};
-use sim_contract::clock::{SECOND_NS, monotonic_ns, realtime_ns};
 use sim_contract::{LostChanges, ReadError, State, StatusFlags};
+use sim_host::clock::{SECOND_NS, monotonic_ns, realtime_ns};
 
 use super::batch::{Batch, Messages, RunEnd, StopReason};
 use super::queue::{Content, FileEnd, Item, Queue};

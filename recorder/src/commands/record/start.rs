@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use recording::{EnergyRow, Message, RunDescription, SceneColliders, SurfaceRow, TopologyRow};
-use sim_contract::clock::{monotonic_ns, realtime_ns};
 use sim_contract::{
     Change, KeyframeHeader, LoadHeader, LoadedScene, ParticleState, SnapshotHeader, State,
     TearsHeader,
 };
+use sim_host::clock::{monotonic_ns, realtime_ns};
 use sim_solver::{EnergyMeter, Scene, SceneError};
 
 /// The start of a file.

@@ -16,7 +16,7 @@ use anyhow::{Context, anyhow};
 use recording::{
     Closing, ContentSelection, LogOptions, LogWriter, Message, PartFile, ParticleBuffer, WriteError,
 };
-use sim_contract::clock::monotonic_ns;
+use sim_host::clock::monotonic_ns;
 
 use super::queue::{Content, Entry, FileEnd, Item, Queue};
 use super::report::Written;

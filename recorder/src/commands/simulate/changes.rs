@@ -10,7 +10,8 @@ use recording::{
     FrameReader, LogEnd, LogReader, Message, OutcomeRow, TimedCommand, parse_commands,
     scene_to_simulate, sort_commands,
 };
-use sim_contract::{Action, Parameter, Part, Reason, Stop};
+use sim_contract::{Action, Parameter, Part, Reason};
+use sim_host::Stop;
 use sim_solver::{Keyframe, Scene, Solver};
 
 use crate::input::{COMMANDS_MAX, timed_command};

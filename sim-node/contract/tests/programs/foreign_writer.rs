@@ -12,7 +12,8 @@
 use iceoryx2::prelude::{
     Config, FileName, NodeBuilder, Path, SemanticString, SignalHandlingMode, ipc,
 };
-use sim_contract::{ParticleState, Ready, RestoreHeader, Stop};
+use sim_contract::{ParticleState, Ready, RestoreHeader};
+use sim_host::Stop;
 
 /// Bytes that look like a keyframe behind the particles.
 const KEYFRAME_SIZE_BYTES: usize = 200;

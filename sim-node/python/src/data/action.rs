@@ -9,8 +9,9 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 use sim_contract::{
     ACTIONS, ActionInfo, ConstraintKind, FieldForm, FieldInfo, KindFilter, MovedObject, PathError,
-    PathPoint, PlainF32, Text, read_scene_file,
+    PathPoint, PlainF32, Text,
 };
+use sim_host::read_scene_file;
 use sim_solver::Scene;
 use sim_solver::scene::is_path;
 

@@ -5,7 +5,8 @@ use std::path::Path;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use recording::LogReader;
-use sim_contract::{BendState, ConstraintState, LoadHeader, Method, Triangle, read_scene_file};
+use sim_contract::{BendState, ConstraintState, LoadHeader, Method, Triangle};
+use sim_host::read_scene_file;
 use sim_solver::{Scene, SceneError, builtin};
 
 use crate::convert::{hash, rows};

@@ -1,6 +1,7 @@
 //! The loop's side of a job: it starts the work, and takes the result over at a boundary.
 
-use sim_contract::{Action, COMMANDS_PER_STEP_MAX, Stop, Text};
+use sim_contract::{Action, COMMANDS_PER_STEP_MAX, Text};
+use sim_host::Stop;
 use sim_solver::{Keyframe, Plan};
 
 use super::{Done, Job, Work, load};

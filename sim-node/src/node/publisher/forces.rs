@@ -1,7 +1,7 @@
 //! Forces: computed and published only while a client reads them.
 
-use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{ForceKind, ForceRow, ForcesHeader, Owner, OwnerError};
+use sim_host::clock::{SECOND_NS, monotonic_ns};
 use sim_solver::{Forces, FrameImpulse, Solver};
 
 use super::load::count;

@@ -10,7 +10,8 @@ use std::thread::{self, JoinHandle};
 use anyhow::{Context, anyhow};
 use rustix::process::{Pid, Signal, kill_process};
 use serde::Deserialize;
-use sim_contract::{Endpoint, console};
+use sim_contract::Endpoint;
+use sim_host::console;
 
 /// File name of the program.
 const PROGRAM: &str = "recorder";

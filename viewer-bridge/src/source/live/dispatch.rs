@@ -3,8 +3,8 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
-use sim_contract::clock::monotonic_ns;
 use sim_contract::{Action, Client, Outcome, Reason, RequestError};
+use sim_host::clock::monotonic_ns;
 
 use super::actions::{CommandContext, actions};
 use crate::limits::{COMMANDS_QUEUED_MAX, GRABS_PER_CLIENT_MAX, OUTCOME_TIMEOUT};

@@ -4,11 +4,11 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use recording::{StatusRow, StepRow};
-use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{
     Action, AttachError, Client, Endpoint, NodeStatus, Parameter, ParameterValues, SnapshotFlags,
     Tap,
 };
+use sim_host::clock::{SECOND_NS, monotonic_ns};
 
 use super::actions::CommandContext;
 use super::carrier::{Carrier, LiftState};

@@ -10,8 +10,8 @@ pub(super) mod stack;
 
 use std::collections::BTreeMap;
 
-use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{Action, Client, Outcome, Reason, SentState, Text};
+use sim_host::clock::{SECOND_NS, monotonic_ns};
 
 use super::newest_state::LoadedState;
 use crate::limits::UNDO_TIMEOUT;

@@ -8,8 +8,8 @@ use recording::{
     IndexedLog, LogEnd, LoggedMessage, Message, OutcomeRow, ReadError, StepRow, TearTracker,
     state_hash,
 };
-use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{ParticleState, Torn};
+use sim_host::clock::{SECOND_NS, monotonic_ns};
 
 use super::marks::Marks;
 use crate::message::{Hashes, Mark, MarkKind};

@@ -14,7 +14,8 @@ use std::thread::{self, JoinHandle};
 
 use recording::verification::distance;
 use recording::{ReadError, Tape, TapeError, TapeState};
-use sim_contract::{ConstraintState, ParticleState, Stop};
+use sim_contract::{ConstraintState, ParticleState};
+use sim_host::Stop;
 
 use super::open::Recording;
 use crate::message::{GhostState, GhostText, Refusal};

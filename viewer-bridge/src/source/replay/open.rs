@@ -6,7 +6,7 @@ use std::path::Path;
 
 use anyhow::{Context, anyhow, bail};
 use recording::{LogEnd, ReadError, Tape, TapeError, TapeState};
-use sim_contract::Stop;
+use sim_host::Stop;
 
 use crate::scene::load::Load;
 use crate::scene::summary::SceneSummary;

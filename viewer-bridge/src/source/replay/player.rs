@@ -4,8 +4,8 @@ use std::sync::mpsc::Receiver;
 use std::time::Duration;
 
 use recording::{ReadError, TapeError, TapeState};
-use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{Action, Forces, ForcesHeader, Parameter, ParameterValue, Reason};
+use sim_host::clock::{SECOND_NS, monotonic_ns};
 
 use super::check::Report;
 use super::ghosts::Ghosts;

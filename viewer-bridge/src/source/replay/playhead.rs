@@ -1,6 +1,6 @@
 //! The place in a recording. It advances with the clock while the recording plays.
 
-use sim_contract::clock::SECOND_NS;
+use sim_host::clock::SECOND_NS;
 
 /// The place in a recording and its progress. All times are `CLOCK_MONOTONIC` in ns.
 #[derive(Debug, Clone, Copy, PartialEq)]

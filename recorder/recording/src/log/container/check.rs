@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::io::{Read, Seek};
 
 use mcap::records::{Channel, MessageHeader, Record, op};
-use sim_contract::Stop;
+use sim_host::Stop;
 
 use super::content::ContentCheck;
 use super::finding::{CheckExtent, CheckReport, Findings, after_end_text, record_name};

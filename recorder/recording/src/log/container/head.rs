@@ -38,7 +38,7 @@ impl FileHead {
     pub(super) fn add_damage(&mut self, size_bytes: u64) {
         if self.content.is_none() {
             let size_bytes = usize::try_from(size_bytes).unwrap_or(usize::MAX);
-            self.scene_size_bytes = size_bytes.min(sim_contract::SCENE_SIZE_BYTES_MAX);
+            self.scene_size_bytes = size_bytes.min(sim_messages::SCENE_SIZE_BYTES_MAX);
         }
     }
 

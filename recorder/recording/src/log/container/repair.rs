@@ -12,7 +12,7 @@ use std::ops::Range;
 
 use mcap::records::{MessageIndex, Metadata, Record, op};
 use mcap::{Attachment, MAGIC};
-use sim_contract::Stop;
+use sim_host::Stop;
 
 use super::check::WRONG_CHECKSUM;
 use super::finding::{AfterEnd, Findings, RepairReport, record_name};

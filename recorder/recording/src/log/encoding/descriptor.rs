@@ -379,7 +379,7 @@ mod tests {
     use std::collections::BTreeMap;
 
     use prost::encoding::{WireType, decode_key, decode_varint};
-    use sim_contract::ParticleState;
+    use sim_messages::ParticleState;
     use sim_solver::scene::Up;
 
     use super::*;

@@ -1,6 +1,6 @@
 //! Particles that are written without another copy.
 
-use sim_contract::ParticleState;
+use sim_messages::ParticleState;
 
 use super::protobuf::encode_cloud_head;
 

@@ -11,7 +11,7 @@ use prost::encoding::{
     DecodeContext, WireType, decode_key, decode_varint, encode_key, encode_varint, skip_field,
 };
 use prost_types::Timestamp;
-use sim_contract::ParticleState;
+use sim_messages::ParticleState;
 use sim_solver::scene::Up;
 
 /// Name of the particles' frame. `/tf` gives its pose in the frame `map`.

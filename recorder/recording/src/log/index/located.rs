@@ -2,7 +2,7 @@
 
 use mcap::MAGIC;
 use mcap::records::{ChunkIndex, Footer, Record, op};
-use sim_contract::Stop;
+use sim_host::Stop;
 
 use crate::log::input_file::FileSource;
 use crate::log::read_error::{LogEnd, ReadError};

@@ -2,7 +2,7 @@
 
 use mcap::records::MessageHeader;
 use serde::de::DeserializeOwned;
-use sim_contract::ParticleState;
+use sim_messages::ParticleState;
 
 use crate::log::encoding::{decode_keyframe, decode_particles};
 use crate::log::message::Message;

@@ -2,7 +2,7 @@
 
 use std::io::Read;
 
-use sim_contract::ParticleState;
+use sim_messages::ParticleState;
 
 use super::decode::LoggedMessage;
 use super::reader::{ChunkStart, LogReader};

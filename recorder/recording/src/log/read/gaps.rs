@@ -85,7 +85,7 @@ impl GapCounter {
 
 #[cfg(test)]
 mod tests {
-    use sim_contract::{Action, Command, Outcome};
+    use sim_messages::{Action, Command, Outcome};
 
     use super::*;
     use crate::log::rows::OutcomeRow;

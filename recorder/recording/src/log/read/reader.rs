@@ -7,7 +7,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 use mcap::records::{MessageHeader, Record, op};
-use sim_contract::{ParticleState, Stop};
+use sim_host::Stop;
+use sim_messages::ParticleState;
 
 use super::decode::{LoggedMessage, MessageDecoder};
 use super::records::RecordReader;

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use sim_contract::{ColliderShape, ColliderState, PlainF32};
+use sim_messages::{ColliderShape, ColliderState, PlainF32};
 use sim_solver::Scene;
 use sim_solver::scene::{ColliderMesh, SceneCollider};
 use xxhash_rust::xxh3::xxh3_64;

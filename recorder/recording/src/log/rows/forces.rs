@@ -2,7 +2,7 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use sim_contract::{ForceKind, ForceRow, PlainF32};
+use sim_messages::{ForceKind, ForceRow, PlainF32};
 
 /// Three numbers, which JSON stores bit for bit.
 type Vector = [PlainF32; 3];

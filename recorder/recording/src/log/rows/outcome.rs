@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, json};
-use sim_contract::{
+use sim_messages::{
     ACTIONS, Action, Command, FieldForm, OUTCOME_FLAG_DISCONNECTED, OUTCOME_FLAG_NEW_RUN, Outcome,
     OutcomeStatus, Reason, RestoreContents,
 };

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 use serde_json::Map;
-use sim_contract::{
+use sim_messages::{
     ConstraintKind, MemberChange, NodeStatus, OffMeaning, PARAMETERS, ParameterInfo,
     ParameterValues, Parts, SnapshotHeader, TearCause, TornConstraint, ValueForm,
 };
@@ -19,7 +19,7 @@ pub struct StepRow {
     /// Steps since the scene was last loaded, reset or restored.
     pub scene_step: u64,
     /// XXH3-64 of the particles, as 16 hex digits.
-    #[serde(with = "sim_contract::json_hash")]
+    #[serde(with = "sim_messages::json_hash")]
     #[schemars(with = "String")]
     pub state_hash: u64,
     /// Number of scene loads in this run, minus one.
@@ -272,7 +272,7 @@ struct BlockValueSchema {
 
 #[cfg(test)]
 mod parameters_tests {
-    use sim_contract::{BlockValue, Parameter};
+    use sim_messages::{BlockValue, Parameter};
 
     use super::*;
 

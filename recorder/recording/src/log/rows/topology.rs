@@ -2,7 +2,7 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use sim_contract::{
+use sim_messages::{
     BendState, ConstraintState, LoadHeader, PlainF32, Torn, TornConstraint, Triangle,
 };
 use sim_solver::{Bend, Solver};

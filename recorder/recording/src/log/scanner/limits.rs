@@ -12,7 +12,7 @@ use crate::log::topic::Topic;
 pub(in crate::log) const RECORD_HEADER_SIZE_BYTES: usize = 9;
 /// Longest record that is read before the size of the scene is known: the attachment with the scene.
 pub(in crate::log) const HEADER_RECORD_SIZE_BYTES_MAX: u64 =
-    sim_contract::SCENE_SIZE_BYTES_MAX as u64 + TEXT_SIZE_BYTES_MAX;
+    sim_messages::SCENE_SIZE_BYTES_MAX as u64 + TEXT_SIZE_BYTES_MAX;
 /// Longest header, channel, schema or metadata record. Those of a recorder have a few kilobytes.
 pub(in crate::log) const TEXT_SIZE_BYTES_MAX: u64 = 1 << 16;
 /// Size of a message beside the columns that grow with the scene.
@@ -127,7 +127,7 @@ impl SizeLimits {
 
 #[cfg(test)]
 mod tests {
-    use sim_contract::{
+    use sim_messages::{
         BendState, BlockValue, COLLIDERS_MAX, ConstraintState, ELEMENTS_MAX, LoadHeader,
         ParameterValues, PlainF32, TearCause, TornConstraint,
     };

@@ -2,7 +2,7 @@
 
 use std::io::{self, Read, Seek, SeekFrom};
 
-use sim_contract::Stop;
+use sim_host::Stop;
 
 use crate::log::read_error::{ReadError, check_stop};
 

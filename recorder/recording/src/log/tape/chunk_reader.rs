@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
-use sim_contract::{ParticleState, Torn, TornConstraint};
+use sim_messages::{ParticleState, Torn, TornConstraint};
 
 use crate::log::index::{ChunkEntry, IndexedLog};
 use crate::log::message::Message;

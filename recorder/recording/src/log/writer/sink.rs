@@ -215,7 +215,7 @@ mod tests {
 
     use mcap::records::{MessageHeader, Metadata};
     use mcap::{Compression, WriteOptions, Writer};
-    use sim_contract::ParticleState;
+    use sim_messages::ParticleState;
 
     use super::*;
 

@@ -196,8 +196,8 @@ impl Trigger {
 #[cfg(test)]
 mod tests {
     use recording::{EventRow, Message, OutcomeRow, TearsRow};
-    use sim_contract::clock::SECOND_NS;
     use sim_contract::{Action, Command, Outcome, Reason, TearCause, Text, TornConstraint};
+    use sim_host::clock::SECOND_NS;
 
     use super::*;
 

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use recording::{Closing, Message, Topic};
-use sim_contract::clock::SECOND_NS;
+use sim_host::clock::SECOND_NS;
 
 use crate::cli::output;
 use crate::commands::record::queue::{Content, FileEnd, Item};

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use recording::{Existing, LogReader, PartFileError, ReadError, counted};
-use sim_contract::is_being_written;
+use sim_host::is_being_written;
 
 use crate::cli::output;
 

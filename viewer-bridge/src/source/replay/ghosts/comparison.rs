@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 
 use recording::verification::{SnapshotDifference, snapshot_difference};
 use recording::{Frame, FrameReader, IndexedLog, LogEnd, ReadError};
-use sim_contract::Stop;
+use sim_host::Stop;
 
 /// The result of a comparison, up to the first difference.
 #[derive(Debug, Default)]

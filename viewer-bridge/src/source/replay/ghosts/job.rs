@@ -7,8 +7,9 @@ use std::sync::mpsc::Sender;
 
 use anyhow::{Context, bail};
 use recording::{IndexedLog, Tape};
-use sim_contract::clock::{SECOND_NS, monotonic_ns};
-use sim_contract::{ConstraintState, Stop};
+use sim_contract::ConstraintState;
+use sim_host::Stop;
+use sim_host::clock::{SECOND_NS, monotonic_ns};
 
 use super::super::open::{self, Recording, file_of};
 use super::comparison::{Compared, compare};
