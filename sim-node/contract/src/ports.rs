@@ -1,5 +1,5 @@
-//! Services, readers and writers. Beside the derives of the messages, only these files, `owner.rs`,
-//! `client/watch.rs` and those of `domain` name iceoryx2.
+//! Services, readers and writers. Of the files elsewhere, only those of `domain`, `owner.rs`, `owner/repetition.rs`,
+//! `client/latch.rs` and `client/watch.rs` name iceoryx2.
 
 pub(crate) mod connection;
 pub(crate) mod domain;

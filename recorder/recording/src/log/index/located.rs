@@ -107,8 +107,9 @@ pub(in crate::log) fn summary_start(
         return Ok(None);
     };
     let end = window.bytes(footer_start, END_SIZE_BYTES)?;
-    let footer = end.strip_suffix(MAGIC).filter(|footer| footer[0] == op::FOOTER);
-    let footer = footer.map(|one| mcap::parse_record(op::FOOTER, &one[RECORD_HEADER_SIZE_BYTES..]));
+    let footer = end.strip_suffix(MAGIC).filter(|end| end.first() == Some(&op::FOOTER));
+    let body = footer.and_then(|footer| footer.get(RECORD_HEADER_SIZE_BYTES..));
+    let footer = body.map(|body| mcap::parse_record(op::FOOTER, body));
     Ok(match footer {
         Some(Ok(Record::Footer(Footer { summary_start, .. }))) => {
             Some(summary_start).filter(|start| (1..=footer_start).contains(start))
