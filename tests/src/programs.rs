@@ -93,7 +93,9 @@ static FOLDER: OnceLock<PathBuf> = OnceLock::new();
 /// Returns the folder of the programs, built with the profile of this test.
 fn built() -> &'static Path {
     FOLDER.get_or_init(|| {
-        build(&["--quiet", "--workspace", "--lib", "--bins", "--examples"]).expect("the programs")
+        let selection =
+            ["--workspace", "--exclude", "catenary-python", "--lib", "--bins", "--examples"];
+        build(&[&["--quiet"], &selection[..]].concat()).expect("the programs")
     })
 }
 

@@ -2,7 +2,6 @@
 
 use std::error::Error as StdError;
 use std::path::Path;
-use std::time::Duration;
 
 use pyo3::import_exception;
 use pyo3::prelude::*;
@@ -10,8 +9,6 @@ use sim_contract::{
     AttachError, EndpointError, LockstepError, OwnerState, ReadError, RequestError,
 };
 use sim_solver::scene::LoadError;
-
-use crate::patience::PART;
 
 import_exception!(catenary._errors, Error);
 import_exception!(catenary._errors, NotRunning);
@@ -91,20 +88,5 @@ fn with_causes(error: &dyn StdError) -> String {
     match error.source() {
         Some(cause) => format!("{error}: {}", with_causes(cause)),
         None => error.to_string(),
-    }
-}
-
-/// Returns the error of the last part of a wait as that of the whole wait.
-pub(crate) fn with_timeout(error: RequestError, timeout_s: Option<f64>) -> RequestError {
-    let total = timeout_s.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
-    let total = total.unwrap_or(PART);
-    match error {
-        RequestError::Timeout { sequence, owner, .. } => {
-            RequestError::Timeout { sequence, timeout: total, owner }
-        }
-        RequestError::OutcomesMissed { sequence, missed_count, .. } => {
-            RequestError::OutcomesMissed { sequence, timeout: total, missed_count }
-        }
-        other => other,
     }
 }

@@ -22,9 +22,9 @@ use crate::data::scene::{Bends, Topology, corners};
 use crate::data::snapshot::{ForcesSource, Snapshot};
 use crate::data::state::{State, current_state};
 use crate::error::{
-    NotRunning, Timeout, TooManySnapshots, endpoint_error, read_error, request_error, with_timeout,
+    NotRunning, Timeout, TooManySnapshots, endpoint_error, read_error, request_error,
 };
-use crate::patience::{Patience, wait};
+use crate::patience::{Patience, wait, with_timeout};
 use crate::process::OfProcess;
 
 /// Longest wait for messages that a node has published once per load, in seconds.

@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use sim_contract::RequestError;
 use sim_host::Stop;
 use sim_host::clock::monotonic_ns;
 
@@ -103,4 +104,19 @@ pub(crate) fn run_until_signal<T: Send>(
             }
         }
     })
+}
+
+/// Returns the error of the last part of a wait as that of the whole wait.
+pub(crate) fn with_timeout(error: RequestError, timeout_s: Option<f64>) -> RequestError {
+    let total = timeout_s.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
+    let total = total.unwrap_or(PART);
+    match error {
+        RequestError::Timeout { sequence, owner, .. } => {
+            RequestError::Timeout { sequence, timeout: total, owner }
+        }
+        RequestError::OutcomesMissed { sequence, missed_count, .. } => {
+            RequestError::OutcomesMissed { sequence, timeout: total, missed_count }
+        }
+        other => other,
+    }
 }

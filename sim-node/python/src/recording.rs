@@ -2,6 +2,7 @@
 
 use std::error::Error as StdError;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
 use numpy::{PyArray1, PyArray2, PyArray3};
@@ -217,7 +218,9 @@ impl Recording {
             let state = tape.state_at(step)?;
             Ok::<_, TapeError>((header(tape.run(), &state), state.particles))
         })?;
-        Ok(Snapshot::own(header, particles, ForcesSource::Recorded(this.clone().unbind())))
+        let recording = this.clone().unbind();
+        let read_forces = move |py: Python<'_>, step| recording.get().forces(py, step);
+        Ok(Snapshot::own(header, particles, ForcesSource::Recorded(Arc::new(read_forces))))
     }
 
     /// Returns the first recorded step after `step`.

@@ -21,9 +21,8 @@ use crate::data::action::Action;
 use crate::data::forces::Forces;
 use crate::data::outcome::{cause, indices, rejected};
 use crate::data::scene::{Bends, Topology, corners, load_scene, scene_error};
-use crate::data::snapshot::{ForcesSource, POSITION, Snapshot, VELOCITY};
+use crate::data::snapshot::{ForcesSource, POSITION, Snapshot, VELOCITY, vectors};
 use crate::data::state::State;
-use crate::data::view;
 use crate::error::{Error, StateError, recording_error};
 use crate::patience::PART;
 use crate::picture::{Caption, Corners, PictureRequest, PixelSize};
@@ -312,13 +311,13 @@ impl Simulation {
     /// The current positions in metres, as a read-only view of `snapshot()`. Shape: (particles, 3).
     #[getter]
     fn positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        view::vectors(&Bound::new(py, self.snapshot(py)?)?, POSITION)
+        vectors(&Bound::new(py, self.snapshot(py)?)?, POSITION)
     }
 
     /// The current velocities in metres per second, as a read-only view of `snapshot()`. Shape: (particles, 3).
     #[getter]
     fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        view::vectors(&Bound::new(py, self.snapshot(py)?)?, VELOCITY)
+        vectors(&Bound::new(py, self.snapshot(py)?)?, VELOCITY)
     }
 
     /// Hash of the current state.

@@ -240,7 +240,7 @@ impl RequestBridge {
             id
         };
         let command = Command { id: Some(id), ..Command::new(action) };
-        let submitted = command.kind.check().map_err(Refusal::from).and_then(|()| {
+        let submitted = command.kind.check().and_then(|()| {
             self.requests.send(client, RequestKind::Command(command)).map_err(|_| Refusal::Busy)
         });
         if let Err(reason) = submitted {

@@ -5,6 +5,7 @@ use serde_json::{Map, Value};
 use sim_contract::{ACTIONS, Action, GRAB_OVER_S_DEFAULT, NumberRange, Reason};
 use thiserror::Error;
 
+use super::refusal::Refusal;
 use super::timeline::Toward;
 use crate::limits::{CONSTRAINTS_PER_CUT_MAX, STEPS_AT_ONCE_MAX};
 
@@ -236,7 +237,14 @@ impl CommandKind {
     ///
     /// # Errors
     /// A number is not finite or out of its range, or a vector has no direction.
-    pub fn check(&self) -> Result<(), Reason> {
+    pub fn check(&self) -> Result<(), Refusal> {
+        self.check_numbers().map_err(|reason| match self {
+            Self::Action(action) => Refusal::of_action(reason, action),
+            _ => reason.into(),
+        })
+    }
+
+    fn check_numbers(&self) -> Result<(), Reason> {
         match self {
             Self::Action(Action::Step { count }) | Self::StepBack { count } => {
                 if (1..=STEPS_AT_ONCE_MAX).contains(count) {
@@ -275,9 +283,9 @@ mod tests {
     use super::*;
     use crate::message::FromPage;
 
-    fn check_text(text: &str) -> Result<(), Reason> {
+    fn check_text(text: &str) -> Result<(), &'static str> {
         match FromPage::parse(text).unwrap() {
-            FromPage::Command(command) => command.kind.check(),
+            FromPage::Command(command) => command.kind.check().map_err(Refusal::name),
             other => panic!("{other:?} is not a command"),
         }
     }
@@ -293,11 +301,11 @@ mod tests {
             r#"{"kind":"step","count":10001}"#,
             r#"{"kind":"step_back","count":10001}"#,
         ] {
-            assert_eq!(check_text(text), Err(Reason::OutOfRange), "{text}");
+            assert_eq!(check_text(text), Err("out_of_range"), "{text}");
         }
         let ids = vec!["1"; CONSTRAINTS_PER_CUT_MAX + 1].join(",");
         let cut = format!(r#"{{"kind":"cut_constraints","epoch":1,"constraints":[{ids}]}}"#);
-        assert_eq!(check_text(&cut), Err(Reason::OutOfRange));
+        assert_eq!(check_text(&cut), Err("out_of_range"));
     }
 
     #[test]
@@ -306,7 +314,7 @@ mod tests {
             r#"{"kind":"grab","particle":1,"target":[0,1e39,0]}"#,
             r#"{"kind":"throw","object":"anchor","index":0,"velocity":[1e39,0,0]}"#,
         ] {
-            assert_eq!(check_text(text), Err(Reason::NonFinite), "{text}");
+            assert_eq!(check_text(text), Err("non_finite"), "{text}");
         }
     }
 
@@ -361,5 +369,14 @@ mod tests {
         ] {
             assert!(FromPage::parse(text).is_err(), "{text}");
         }
+    }
+
+    #[test]
+    fn a_wrong_parameter_is_refused_with_its_range_or_its_new_name() {
+        let refused = |name, value: f32| {
+            CommandKind::Action(Action::set(name, value)).check().unwrap_err().text("set")
+        };
+        assert_eq!(refused("tear_force", -1.0), "tear_force accepts a number > 0");
+        assert_eq!(refused("wind_drag", 1.0), "the parameter is now called wind.drag");
     }
 }

@@ -300,7 +300,7 @@ fn control_recording(context: &PageContext, client: ClientId, command: &Command)
 /// Checks a command and sends it to the source. Answers it here if it is refused.
 fn submit(hub: &Hub, client: ClientId, command: Command) {
     let (id, kind) = (command.id, command.kind.name());
-    let submitted = command.kind.check().map_err(Refusal::from).and_then(|()| {
+    let submitted = command.kind.check().and_then(|()| {
         hub.requests().send(client, RequestKind::Command(command)).map_err(|_| Refusal::Busy)
     });
     if let Err(reason) = submitted {

@@ -212,12 +212,12 @@ impl IndexedLog {
             }
             read => read?,
         }
-        let body_size = size_bytes.checked_sub(RECORD_HEADER_SIZE_BYTES as u64);
-        if split_header(&bytes) != Some(op::CHUNK).zip(body_size) {
+        let (head, body) = bytes.split_at(bytes.len().min(RECORD_HEADER_SIZE_BYTES));
+        if split_header(head) != Some((op::CHUNK, body.len() as u64)) {
             return Err(damaged("no chunk starts here".to_owned()));
         }
         let (channels, run, limits) = (&mut self.channels, &self.run, &self.limits);
-        let chunk = Chunk::new(&bytes[RECORD_HEADER_SIZE_BYTES..], limits).map_err(damaged)?;
+        let chunk = Chunk::new(body, limits).map_err(damaged)?;
         let mut content = ChunkContent::default();
         content.read(&chunk).map_err(damaged)?;
         let memory_max = limits.decoded_size_bytes_max();

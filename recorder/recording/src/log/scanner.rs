@@ -348,78 +348,92 @@ impl<R: Read> RecordScanner<R> {
 
     /// Examines the bytes at a position.
     fn form(&mut self, byte: u64) -> Result<Form, ReadError> {
-        let wrong = |cause: String, is_cut| Ok(Form::Wrong { cause, is_cut });
         let header = self.window.bytes(byte, RECORD_HEADER_SIZE_BYTES)?;
         let Some((opcode, length)) = split_header(header) else {
             return match header {
                 [] => Ok(Form::EndOfFile),
-                _ => wrong("the file ends within a record".to_owned(), true),
+                _ => Ok(wrong("the file ends within a record".to_owned(), true)),
             };
         };
-        if opcode == 0 || (op::DATA_END + 1..PRIVATE_MIN).contains(&opcode) {
-            return wrong(format!("a record with opcode {opcode}"), false);
+        // A reader that stops at damage needs no record of another program once it knows the run, or in the index.
+        let passes_over = !self.goes_on && (self.limits.is_some() || self.section.is_none());
+        let is_unknown = (op::DATA_END + 1..PRIVATE_MIN).contains(&opcode);
+        if opcode == 0 || is_unknown && !passes_over {
+            return Ok(wrong(format!("a record with opcode {opcode}"), false));
         }
         let body = byte + RECORD_HEADER_SIZE_BYTES as u64;
         let mut chunk = None;
         if let (op::CHUNK, Some(limits)) = (opcode, &self.limits) {
             let start_size = usize::try_from(length).unwrap_or(usize::MAX);
             let start_size = start_size.min(CHUNK_START_SIZE_BYTES_MAX);
-            let start = self.window.bytes(body, start_size)?;
+            let start = self.window.bytes(byte, RECORD_HEADER_SIZE_BYTES + start_size)?;
+            let start = start.get(RECORD_HEADER_SIZE_BYTES..).unwrap_or_default();
             match chunk_header(start, length, limits) {
                 Ok(header) => chunk = Some(header),
-                Err(cause) => return wrong(cause, start.len() < start_size),
+                Err(cause) => return Ok(wrong(cause, start.len() < start_size)),
             }
         }
         let limit = size_bytes_max(opcode, self.limits.as_ref());
+        let is_of_others = is_unknown
+            || length > limit && !matches!(opcode, op::CHUNK | op::MESSAGE | op::ATTACHMENT);
         // Without a scene, nothing bounds the memory for a chunk.
-        let is_skipped = opcode >= PRIVATE_MIN || opcode == op::CHUNK && chunk.is_none();
+        let is_skipped = opcode >= PRIVATE_MIN
+            || opcode == op::CHUNK && chunk.is_none()
+            || is_of_others && passes_over;
         // A reader that stops at damage needs no attachment but the scene before the limits are known.
         let is_skippable = opcode == op::ATTACHMENT && (self.goes_on || self.limits.is_some());
-        if length > limit && !is_skippable {
+        if length > limit && !is_skippable && !is_skipped {
             let part = match (opcode, &self.limits) {
                 (op::MESSAGE, _) => "a message",
                 (_, None) => "a record before the first message",
                 _ => "a record",
             };
-            return wrong(SizeLimits::exceeded(part, length, limit), false);
+            return Ok(wrong(SizeLimits::exceeded(part, length, limit), false));
         }
         let left = self.size_bytes().saturating_sub(body);
-        let cut = |left| {
-            let cause = format!(
-                "a record of {length} bytes, but the file ends {left} bytes after its header"
-            );
-            wrong(cause, true)
-        };
         if length > left {
-            return cut(left);
+            return Ok(cut(length, left));
         }
         let size_bytes = length + RECORD_HEADER_SIZE_BYTES as u64;
         if is_skipped {
             return Ok(Form::Skipped { opcode, size_bytes });
         }
-        let other_length = || wrong("its length is not that of its fields".to_owned(), false);
         if length > limit {
             let start = self.window.bytes(byte, BLOCK_SIZE_BYTES)?;
             return match LongAttachment::read(byte, size_bytes, start) {
                 Some(attachment) => Ok(Form::LongAttachment(attachment)),
-                None => other_length(),
+                None => Ok(wrong(OTHER_LENGTH.to_owned(), false)),
             };
         }
         let size_bytes = usize::try_from(size_bytes).unwrap_or(usize::MAX);
         let record = self.window.bytes(byte, size_bytes)?;
         if record.len() < size_bytes {
             let left = record.len().saturating_sub(RECORD_HEADER_SIZE_BYTES) as u64;
-            return cut(left);
+            return Ok(cut(length, left));
         }
         if let Some((header, start_size)) = chunk {
             return Ok(Form::Chunk { header, start_size, size_bytes });
         }
         match check_fields(opcode, &record[RECORD_HEADER_SIZE_BYTES..]) {
             Ok(0) => Ok(Form::Record { opcode, size_bytes }),
-            Ok(_) => other_length(),
-            Err(cause) => wrong(cause, false),
+            Ok(_) => Ok(wrong(OTHER_LENGTH.to_owned(), false)),
+            Err(cause) => Ok(wrong(cause, false)),
         }
     }
+}
+
+const OTHER_LENGTH: &str = "its length is not that of its fields";
+
+/// Returns the form of bytes that are no record. The file may end within it.
+fn wrong(cause: String, is_cut: bool) -> Form {
+    Form::Wrong { cause, is_cut }
+}
+
+/// Returns the form of a record of `length` bytes, of which the file has `left`.
+fn cut(length: u64, left: u64) -> Form {
+    let cause =
+        format!("a record of {length} bytes, but the file ends {left} bytes after its header");
+    wrong(cause, true)
 }
 
 impl LongAttachment {

@@ -1,8 +1,11 @@
-//! A state of the particles.
+//! A state of the particles, as NumPy arrays that view it without a copy.
 
 use std::sync::Arc;
 
-use numpy::{PyArray1, PyArray2};
+use bytemuck::cast_slice;
+use numpy::ndarray::{ArrayView1, ArrayView2, Dimension, s};
+use numpy::npyffi::NPY_ARRAY_WRITEABLE;
+use numpy::{PyArray, PyArray1, PyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use recording::ForcesRow;
@@ -10,10 +13,8 @@ use sim_contract::{ParticleState, SnapshotFlags, SnapshotHeader};
 
 use crate::convert::{hash, hash_hex};
 use crate::data::forces::Forces;
-use crate::data::view;
 use crate::error::Error;
 use crate::process::OfProcess;
-use crate::recording::Recording;
 
 /// The place of the particles. It never changes.
 #[derive(Debug)]
@@ -27,25 +28,18 @@ enum Memory {
 /// Steps per second.
 type Rate = u32;
 
+/// Reads the forces of a step.
+type ReadForces = Arc<dyn Fn(Python<'_>, u64) -> PyResult<Forces> + Send + Sync>;
+
 /// Where the forces of the step come from.
-#[derive(Debug)]
+#[derive(Clone)]
 pub(crate) enum ForcesSource {
     /// Nobody asked for them. The text names the way.
     Unread(&'static str),
     /// `None` if they were not computed in this step.
     Read(Option<(ForcesRow, Rate)>),
     /// The recording is read once they are needed.
-    Recorded(Py<Recording>),
-}
-
-impl ForcesSource {
-    fn clone_ref(&self, py: Python<'_>) -> Self {
-        match self {
-            Self::Unread(cure) => Self::Unread(cure),
-            Self::Read(row) => Self::Read(row.clone()),
-            Self::Recorded(recording) => Self::Recorded(recording.clone_ref(py)),
-        }
-    }
+    Recorded(ReadForces),
 }
 
 /// The first field of each vector and the numbers of [`ParticleState`], in units of 4 bytes.
@@ -59,7 +53,6 @@ const FLAGS: usize = 7;
 /// The arrays view the particles without a copy, and are read-only. Each of them keeps the snapshot alive. A
 /// node lends a program at most 4 snapshots at a time, so keep copies: `snapshot.positions.copy()`.
 #[pyclass(frozen, module = "catenary")]
-#[derive(Debug)]
 pub(crate) struct Snapshot {
     header: SnapshotHeader,
     memory: Memory,
@@ -113,25 +106,25 @@ impl Snapshot {
     /// Positions in metres, relative to the origin of the scene. Shape: (particles, 3).
     #[getter]
     fn positions<'py>(this: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        view::vectors(this, POSITION)
+        vectors(this, POSITION)
     }
 
     /// Velocities in metres per second. Shape: (particles, 3).
     #[getter]
     fn velocities<'py>(this: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        view::vectors(this, VELOCITY)
+        vectors(this, VELOCITY)
     }
 
     /// Inverse masses in 1/kg; 0 for particles that the step does not move. Shape: (particles,).
     #[getter]
     fn inverse_masses<'py>(this: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray1<f32>>> {
-        view::numbers(this, INVERSE_MASS)
+        numbers(this, INVERSE_MASS)
     }
 
     /// Sums of PINNED, GRABBED, ANCHORED and FROZEN. Shape: (particles,).
     #[getter]
     fn flags<'py>(this: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray1<u32>>> {
-        view::numbers(this, FLAGS)
+        numbers(this, FLAGS)
     }
 
     /// Forces of the step on colliders, anchors and fixed particles. None if the node did not compute them in this step:
@@ -148,9 +141,7 @@ impl Snapshot {
             ForcesSource::Read(row) => {
                 row.as_ref().map(|(row, rate)| Forces::new(py, row, *rate)).transpose()
             }
-            ForcesSource::Recorded(recording) => {
-                recording.get().forces(py, self.header.step).map(Some)
-            }
+            ForcesSource::Recorded(read) => read(py, self.header.step).map(Some),
         }
     }
 
@@ -246,12 +237,12 @@ impl Snapshot {
 
     /// Returns the particles as they are published and recorded: 32 bytes each, little-endian.
     fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        self.with_particles(|particles| PyBytes::new(py, bytemuck::cast_slice(particles)))
+        self.with_particles(|particles| PyBytes::new(py, cast_slice(particles)))
     }
 
     /// Returns the snapshot in the memory of this process, so that it can be kept.
-    fn copy(&self, py: Python<'_>) -> PyResult<Self> {
-        Ok(Self::own(self.header, Arc::new(self.to_vec()?), self.forces.clone_ref(py)))
+    fn copy(&self) -> PyResult<Self> {
+        Ok(Self::own(self.header, Arc::new(self.to_vec()?), self.forces.clone()))
     }
 
     fn __len__(&self) -> usize {
@@ -264,4 +255,54 @@ impl Snapshot {
             "<catenary.Snapshot of step {step}: {particle_count} particles, hash {state_hash:016x}>"
         )
     }
+}
+
+/// Number of 4-byte fields of a particle.
+const FIELDS: usize = size_of::<ParticleState>() / 4;
+
+/// Returns the particles of a snapshot, which the caller must not use after the owner is dropped.
+fn particles<'py>(owner: &Bound<'py, Snapshot>) -> PyResult<&'py [ParticleState]> {
+    let particles: *const [ParticleState] = owner.get().with_particles(std::ptr::from_ref)?;
+    // SAFETY: the owner holds the particles, in one place and unchanged, until it is dropped. No lock is
+    // held while NumPy runs code of Python.
+    Ok(unsafe { &*particles })
+}
+
+/// Returns the first of three fields of each particle as a read-only array of the shape (particles, 3).
+pub(crate) fn vectors<'py>(
+    owner: &Bound<'py, Snapshot>,
+    field: usize,
+) -> PyResult<Bound<'py, PyArray2<f32>>> {
+    let particles = particles(owner)?;
+    let fields = ArrayView2::from_shape((particles.len(), FIELDS), cast_slice(particles))
+        .unwrap_or_else(|_| unreachable!("a particle has {FIELDS} fields"));
+    let vectors = fields.slice(s![.., field..field + 3]);
+    // SAFETY: the array holds the owner, which holds the particles.
+    let array = unsafe { PyArray2::borrow_from_array(&vectors, owner.clone().into_any()) };
+    Ok(read_only(array))
+}
+
+/// Returns a field of each particle as a read-only array of the shape (particles,).
+fn numbers<'py, T: numpy::Element + bytemuck::AnyBitPattern>(
+    owner: &Bound<'py, Snapshot>,
+    field: usize,
+) -> PyResult<Bound<'py, PyArray1<T>>> {
+    let fields: ArrayView1<'_, T> = ArrayView1::from(cast_slice(particles(owner)?));
+    // A scene may have no particle.
+    let field = field.min(fields.len());
+    let numbers = fields.slice(s![field..;FIELDS]);
+    // SAFETY: the array holds the owner, which holds the particles.
+    let array = unsafe { PyArray1::borrow_from_array(&numbers, owner.clone().into_any()) };
+    Ok(read_only(array))
+}
+
+/// Forbids writing. NumPy does not let a program undo this, because the array does not own its memory. A write
+/// would end the process: the memory is mapped for reading only.
+fn read_only<T: numpy::Element, D: Dimension>(
+    array: Bound<'_, PyArray<T, D>>,
+) -> Bound<'_, PyArray<T, D>> {
+    // SAFETY: the array was made just now, so nothing else uses it.
+    let array_object = unsafe { &mut *array.as_array_ptr() };
+    array_object.fields.flags &= !NPY_ARRAY_WRITEABLE;
+    array
 }

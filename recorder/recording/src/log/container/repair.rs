@@ -186,8 +186,10 @@ impl<W: Write> Repair<W> {
     fn add(&mut self, part: FilePart<'_>, chunks: &mut ChunkContent) -> Result<(), RepairError> {
         match part {
             FilePart::Record { byte, opcode, body, section } => {
+                // A second end of the data lies in the index.
+                let ends_data = opcode == op::DATA_END && self.section != Section::Index;
                 self.add_record(byte, opcode, body)?;
-                if let Some(section) = section.filter(|_| opcode == op::DATA_END) {
+                if let Some(section) = section.filter(|_| ends_data) {
                     self.has_wrong_checksum = section.is_wrong();
                     self.is_unexplained = section.is_wrong() && self.findings.count() == 0;
                 }

@@ -74,6 +74,10 @@ impl<R: Read> Window<R> {
     fn load(&mut self, at: u64, size_bytes: usize) -> Result<usize, ReadError> {
         match self.offset(at) {
             Some(offset) => drop(self.bytes.drain(..offset)),
+            None if self.seek.is_none() => {
+                let what = "the bytes of a source that is read in order were passed over";
+                return Err(ReadError::Io(io::Error::other(what)));
+            }
             None => self.bytes.clear(),
         }
         self.start = at;
