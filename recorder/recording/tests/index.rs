@@ -174,3 +174,51 @@ fn a_flipped_bit_damages_only_its_chunk_and_never_changes_a_message() {
         }
     }
 }
+
+/// Returns the position of the first record of a kind, from a position on.
+fn record_from(bytes: &[u8], mut at: usize, opcode: u8) -> usize {
+    while bytes[at] != opcode {
+        let length = u64::from_le_bytes(bytes[at + 1..at + 9].try_into().unwrap());
+        at += 9 + usize::try_from(length).unwrap();
+    }
+    at
+}
+
+#[test]
+fn a_chunk_that_begins_at_the_end_of_what_was_read_ahead_is_read() {
+    const READ_AHEAD: usize = 1 << 20;
+    let bytes = written();
+    let whole = in_order(&bytes);
+    let (head, chunks) = bytes.split_at(record_from(&bytes, 8, 6));
+    for distance in 0..100 {
+        // A record of another program, which is passed over.
+        let length = 8 + READ_AHEAD - distance - head.len() - 9;
+        let record = [&[0x80], &(length as u64).to_le_bytes()[..], &vec![0; length]].concat();
+        assert_eq!(in_order(&[head, &record, chunks].concat()), whole, "{distance} bytes");
+    }
+}
+
+#[test]
+fn an_index_with_a_chunk_that_is_shorter_than_a_record_is_refused() {
+    let bytes = written();
+    let chunk_index = record_from(&bytes, 8, 8) + 9;
+    for length in 0..=9_u64 {
+        let mut changed = bytes.clone();
+        changed[chunk_index + 24..chunk_index + 32].copy_from_slice(&length.to_le_bytes());
+        let file = TestFile::new("short", &changed);
+        let read = file.open().and_then(|mut log| log.read_chunk(0));
+        assert!(matches!(read, Err(ReadError::DamagedChunk { .. })), "{length}: {read:?}");
+    }
+}
+
+#[test]
+fn records_of_other_programs_are_passed_over_behind_the_run() {
+    let bytes = written();
+    let whole = in_order(&bytes);
+    let (head, chunks) = bytes.split_at(record_from(&bytes, 8, 6));
+    // An opcode that is not known, and metadata that is longer than any of ours.
+    for (opcode, length) in [(0x20, 5), (0x0c, 1 << 17)] {
+        let record = [&[opcode], &(length as u64).to_le_bytes()[..], &vec![0; length]].concat();
+        assert_eq!(in_order(&[head, &record, chunks].concat()), whole, "opcode {opcode}");
+    }
+}
