@@ -191,7 +191,7 @@ fn a_chunk_that_begins_at_the_end_of_what_was_read_ahead_is_read() {
     let whole = in_order(&bytes);
     let (head, chunks) = bytes.split_at(record_from(&bytes, 8, 6));
     for distance in 0..100 {
-        // A record of another program, which is passed over.
+        // A record of another program, which the reader skips.
         let length = 8 + READ_AHEAD - distance - head.len() - 9;
         let record = [&[0x80], &(length as u64).to_le_bytes()[..], &vec![0; length]].concat();
         assert_eq!(in_order(&[head, &record, chunks].concat()), whole, "{distance} bytes");
@@ -212,7 +212,7 @@ fn an_index_with_a_chunk_that_is_shorter_than_a_record_is_refused() {
 }
 
 #[test]
-fn records_of_other_programs_are_passed_over_behind_the_run() {
+fn records_of_other_programs_are_skipped_behind_the_run() {
     let bytes = written();
     let whole = in_order(&bytes);
     let (head, chunks) = bytes.split_at(record_from(&bytes, 8, 6));

@@ -75,7 +75,7 @@ impl<R: Read> Window<R> {
         match self.offset(at) {
             Some(offset) => drop(self.bytes.drain(..offset)),
             None if self.seek.is_none() => {
-                let what = "the bytes of a source that is read in order were passed over";
+                let what = "a source that is read in order has no earlier or later bytes";
                 return Err(ReadError::Io(io::Error::other(what)));
             }
             None => self.bytes.clear(),
