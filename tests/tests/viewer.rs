@@ -53,7 +53,7 @@ fn a_page_receives_the_state_that_the_node_publishes() {
     assert_eq!(pins.particles, pinned.collect::<Vec<_>>());
     page.frame(|frame| frame.head.stamp.step > 60);
     page.applied(json!({ "kind": "pause" }));
-    page.text_with("node", "is_paused", &json!(true));
+    bridge.page().text_with("node", "is_paused", &json!(true));
     let mut node = Client::attach(&sandbox.endpoint()).unwrap();
     let snapshot = node.latest_snapshot(DEADLINE).unwrap().unwrap();
     let step = snapshot.header().step;
