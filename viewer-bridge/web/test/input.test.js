@@ -119,7 +119,7 @@ test("a busy page decides by the times of the events, not by those of their arri
   at("pointermove", 400, 20);
   at("pointermove", 440, 60);
   at("pointerup", 441, 60);
-  const move = sent.find(({ type }) => type === "move");
+  const move = sent.find(({ kind }) => kind === "move");
   const target = thrown.camera.project(move.target, VIEWPORT);
   const pixelsPerS = (60 - 20 * (360 / 400)) / 0.08;
   assert.ok(Math.abs(target.x - (event.clientX + 60 + pixelsPerS * move.over_s)) < 0.1, `x ${target.x} px`);
