@@ -30,7 +30,7 @@ use window::Window;
 const INDEX_SIZE_BYTES_MAX: u64 = 8 << 20;
 /// Bytes to examine or to add to a checksum at a time.
 const BLOCK_SIZE_BYTES: usize = 1 << 20;
-/// Opcodes from here on are those of private records.
+/// First opcode of private records.
 const PRIVATE_MIN: u8 = 0x80;
 
 /// A part of a file.
@@ -437,8 +437,8 @@ fn cut(length: u64, left: u64) -> Form {
 }
 
 impl LongAttachment {
-    /// Reads the fields before the data from the first bytes of a record. Returns `None` if its length is
-    /// not that of its fields.
+    /// Reads the fields before the data from the first bytes of a record. Returns `None` if the
+    /// fields do not fill the record.
     fn read(byte: u64, size_bytes: u64, start: &[u8]) -> Option<Self> {
         let mut rest = Unread(start.get(RECORD_HEADER_SIZE_BYTES..)?);
         let header = AttachmentHeader {

@@ -97,7 +97,7 @@ impl RunId {
         self.0.update(bytemuck::bytes_of(&wire));
     }
 
-    /// Adds the place of a first state other than that of the scene.
+    /// Adds the place of a first state that differs from the initial state of the scene.
     pub(crate) fn add_start(&mut self, step: u64, outcome_count: u64) {
         self.0.update(&step.to_le_bytes());
         self.0.update(&outcome_count.to_le_bytes());

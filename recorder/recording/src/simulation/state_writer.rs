@@ -221,8 +221,8 @@ pub fn colliders_row(solver: &Solver, step: u64) -> CollidersRow {
     CollidersRow::new(step, &states).unwrap_or(CollidersRow { step, colliders: Vec::new() })
 }
 
-/// Returns the tears of the last step, which is `step`, or `None` if there are none. All tears of a state
-/// that a command put in place count as those of its step.
+/// Returns the tears of the last step, which is `step`, or `None` without tears. All tears of a state that a command
+/// put in place count as tears of that step.
 pub(crate) fn new_tears_row(solver: &Solver, step: u64, is_in_place: bool) -> Option<TearsRow> {
     let count = if is_in_place { solver.torn().len() } else { solver.new_torn_count() };
     (count > 0).then(|| newest_tears_row(solver, step, count))

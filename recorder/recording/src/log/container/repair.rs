@@ -506,7 +506,7 @@ impl<W: Write> Repair<W> {
                 }
                 return Ok(());
             }
-            // It may be that of the last intact chunk, whose messages are not lost.
+            // The index may belong to the last intact chunk, whose messages are not lost.
             Section::AfterDamage if self.places.check_message_index(byte, 0, index).is_ok() => {
                 return Ok(());
             }

@@ -142,8 +142,8 @@ fn parse(
     mcap::parse_record(opcode, body).map(Some).map_err(|error| error.to_string())
 }
 
-/// Parses a record of a chunk. One that no reader of messages uses, or that is longer than those of a recorder, has no
-/// content.
+/// Parses a record of a chunk. A record that no reader of messages uses, or that is longer than any record of the
+/// recorder, is returned without its content.
 pub(in crate::log) fn parse_inner<'a>(record: &InnerRecord<'a>) -> Result<Record<'a>, String> {
     let InnerRecord { opcode, body, .. } = *record;
     let is_text = is_used(opcode) && opcode != op::MESSAGE;

@@ -300,7 +300,7 @@ pub struct MeshFile {
 }
 
 impl SceneColliders {
-    /// Returns those of a scene.
+    /// Returns the colliders of a scene.
     pub fn new(scene: &Scene) -> Self {
         let mut all = Self::default();
         for collider in &scene.colliders {
