@@ -1,0 +1,1 @@
+//! Nothing: the build scripts of iceoryx2 call bindgen on QNX alone.
