@@ -103,16 +103,26 @@ impl Measurement {
         // It is applied, and changes nothing.
         let action = Action::set("time_scale", 1.0);
         print(READY)?;
+        // The first command waits for the start of the node.
+        self.round_trip(client, action)?;
+        while let Some(nanoseconds) = self.round_trip(client, action)? {
+            self.samples.record(nanoseconds);
+        }
+        Ok(0)
+    }
+
+    /// Sends a command, and returns the time until its outcome. Returns `None` if the measurement ends before.
+    fn round_trip(&self, client: &mut Client, action: Action) -> anyhow::Result<Option<u64>> {
+        let start_ns = monotonic_ns();
+        let sequence = client.send(action)?;
         while !self.has_ended() {
-            let start_ns = monotonic_ns();
-            match client.request(action, WAIT) {
-                Ok(_) => self.samples.record(monotonic_ns() - start_ns),
-                // The node has not started yet, or has ended.
+            match client.outcome(sequence, WAIT) {
+                Ok(_) => return Ok(Some(monotonic_ns() - start_ns)),
                 Err(RequestError::Timeout { .. }) => {}
                 Err(error) => return Err(error.into()),
             }
         }
-        Ok(0)
+        Ok(None)
     }
 
     /// Takes part in the lockstep. A sample is the time from the end of a turn to the next turn.

@@ -65,7 +65,7 @@ fn keys(value: &Value, found: &mut Vec<String>) {
 fn the_report_has_plausible_values_in_documented_fields_and_nothing_remains() {
     let sandbox = Sandbox::new();
     let args =
-        ["bench", "rope", "--rate", "500", "--duration", "200ms", "--readers", "0,2,0", "--json"];
+        ["bench", "rope", "--rate", "500", "--duration", "500ms", "--readers", "0,2,0", "--json"];
     let bench = Process::start(Program::SimNode, &sandbox, &args);
     let domain = domain(&bench);
     let report = bench.wait().json();
