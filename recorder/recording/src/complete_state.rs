@@ -2,8 +2,7 @@
 
 use std::io::Read;
 
-use sim_host::Stop;
-use sim_messages::{ParticleState, scene_hash};
+use sim_messages::{ParticleState, StopFlag, scene_hash};
 
 use super::log::{Frame, FrameReader, LogEnd, LogReader, Message, ReadError, Tape, TapeError};
 use super::scene_state::{RecordedSceneError, recorded_scene, scene_to_simulate};
@@ -75,7 +74,7 @@ pub fn complete_state(
     tape: &mut Tape,
     step: u64,
     steps_max: u64,
-    stop: &Stop,
+    stop: &StopFlag,
 ) -> Result<CompleteState, CompleteStateError> {
     let first = find_start(tape, step)?;
     let begin = first.row.step;
@@ -101,7 +100,7 @@ pub fn state_at_place<R: Read>(
     log: LogReader<R>,
     place: StatePlace,
     threads: usize,
-    stop: &Stop,
+    stop: &StopFlag,
 ) -> Result<CompleteState, CompleteStateError> {
     let StatePlace { step, keyframe_step } = place;
     let mut first = None;
@@ -141,7 +140,7 @@ impl Simulated {
         mut self,
         frames: &mut FrameReader<R>,
         step: u64,
-        stop: &Stop,
+        stop: &StopFlag,
     ) -> Result<CompleteState, CompleteStateError> {
         while self.simulation.step() < step {
             let frame = frames.next_frame()?.ok_or(CompleteStateError::Ended { step })?;

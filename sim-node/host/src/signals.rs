@@ -3,19 +3,20 @@
 
 use std::io::{self, Write, stderr};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::{fs, process, thread};
+use std::sync::atomic::AtomicBool;
+use std::{fs, ops, process, thread};
 
 use signal_hook::consts::{SIGBUS, SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
 use signal_hook::flag;
 use signal_hook::iterator::Signals;
 use signal_hook::low_level::raise;
+use sim_types::StopFlag;
 
 /// Flag that SIGINT, SIGTERM and SIGHUP set. The first signal requests a clean end (ports dropped, files
 /// finished); a second one, unless it is SIGHUP, exits at once. The default flag is not connected to a signal.
 #[derive(Debug, Clone, Default)]
 pub struct Stop {
-    flag: Arc<AtomicBool>,
+    flag: StopFlag,
     signals: Vec<i32>,
 }
 
@@ -45,22 +46,20 @@ impl Stop {
             }
             flag::register(*signal, Arc::clone(&flag))?;
         }
-        Ok(Self { flag, signals })
-    }
-
-    /// Returns the flag itself, for work that checks it often, such as a step of the solver.
-    pub fn flag(&self) -> &AtomicBool {
-        &self.flag
+        Ok(Self { flag: flag.into(), signals })
     }
 
     /// Returns the numbers of the handled signals.
     pub fn signals(&self) -> &[i32] {
         &self.signals
     }
+}
 
-    /// Returns `true` once a signal has arrived.
-    pub fn is_requested(&self) -> bool {
-        self.flag.load(Ordering::Relaxed)
+impl ops::Deref for Stop {
+    type Target = StopFlag;
+
+    fn deref(&self) -> &StopFlag {
+        &self.flag
     }
 }
 

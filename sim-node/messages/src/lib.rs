@@ -36,7 +36,8 @@ pub use sim_types::{
     OVER_S_MAX, OffMeaning, PARAMETERS, Parameter, ParameterInfo, ParameterValue, ParameterValues,
     Part, ParticleFlags, Parts, PathError, PathPart, PathPoint, PlainF32, PointFault, Reason,
     RestoreContents, SCENE_SIZE_BYTES_MAX, SETTINGS_COUNT, STEP_WORK_MAX, Setting, Slider,
-    TearCause, Text, TextError, ValueForm, allowed_indices, json_hash, printable, printable_line,
+    StopFlag, TearCause, Text, TextError, ValueForm, allowed_indices, json_hash, printable,
+    printable_line,
 };
 pub use snapshot::{ParticleState, SnapshotFlags, SnapshotHeader};
 pub use status::{MemberStatus, NodeStatus, StatusFlags};

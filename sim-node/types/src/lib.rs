@@ -1,6 +1,6 @@
 //! Plain data shared by all programs of this project: actions and the reasons for rejecting them,
-//! kinds of constraints, causes of tears, shapes of colliders, particle flags, the limits of a scene, and
-//! the one table of parameters.
+//! kinds of constraints, causes of tears, shapes of colliders, particle flags, the limits of a scene,
+//! the one table of parameters, and the flag that requests an end.
 //!
 //! ```
 //! use sim_types::{Action, PARAMETERS, Parameter};
@@ -25,6 +25,7 @@ mod parameter;
 mod parameter_values;
 mod path_part;
 mod reason;
+mod stop_flag;
 mod suggestion;
 mod text;
 
@@ -46,6 +47,7 @@ pub use parameter::{
 pub use parameter_values::{BlockValue, ParameterValues, SETTINGS_COUNT, Setting};
 pub use path_part::{PathError, PathPart, PathPoint, PointFault};
 pub use reason::Reason;
+pub use stop_flag::StopFlag;
 pub use suggestion::{did_you_mean, nearest};
 pub use text::printable::{printable, printable_line};
 pub use text::{Text, TextError};

@@ -15,7 +15,7 @@ use std::sync::Arc;
 
 use mcap::records::{Record, op};
 
-use sim_host::Stop;
+use sim_messages::StopFlag;
 
 use super::input_file::{FileSource, open_recording};
 use super::read::decode::{LoggedMessage, MessageDecoder};
@@ -38,7 +38,7 @@ pub struct IndexedLog {
     scene: Vec<u8>,
     limits: SizeLimits,
     /// `None` if the program does not handle signals.
-    stop: Option<Stop>,
+    stop: Option<StopFlag>,
     channels: BTreeMap<u16, Option<Topic>>,
     chunks: Vec<ChunkEntry>,
     end: LogEnd,
@@ -92,7 +92,7 @@ impl IndexedLog {
     /// Like [`Self::open`].
     pub fn of_file(
         file: Arc<File>,
-        stop: Option<&Stop>,
+        stop: Option<&StopFlag>,
         on_progress: &mut dyn FnMut(u64, u64),
     ) -> Result<Self, ReadError> {
         let log = LogReader::of_file(Arc::clone(&file), stop)?;
@@ -151,7 +151,7 @@ impl IndexedLog {
     ///
     /// # Errors
     /// If the operating system reports an error.
-    pub fn reader(&self, stop: &Stop) -> Result<LogReader<FileSource>, ReadError> {
+    pub fn reader(&self, stop: &StopFlag) -> Result<LogReader<FileSource>, ReadError> {
         LogReader::of_file(Arc::clone(&self.file), Some(stop))
     }
     /// Returns the run that was recorded.

@@ -4,7 +4,7 @@ use std::fmt;
 use std::io;
 use std::path::PathBuf;
 
-use sim_host::Stop;
+use sim_messages::StopFlag;
 
 use super::run::FORMAT_VERSION;
 
@@ -168,7 +168,7 @@ pub enum ReadError {
 struct Interrupted;
 
 /// Returns an error after a signal.
-pub(super) fn check_stop(stop: Option<&Stop>) -> io::Result<()> {
+pub(super) fn check_stop(stop: Option<&StopFlag>) -> io::Result<()> {
     match stop {
         Some(stop) if stop.is_requested() => Err(io::Error::other(Interrupted)),
         _ => Ok(()),

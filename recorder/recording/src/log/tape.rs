@@ -7,8 +7,7 @@ use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
 
-use sim_host::Stop;
-use sim_messages::{ParticleState, Torn};
+use sim_messages::{ParticleState, StopFlag, Torn};
 
 use super::index::IndexedLog;
 use super::input_file::{FileSource, open_recording};
@@ -98,7 +97,7 @@ impl Tape {
     /// If the file is not a recording or has no snapshot.
     pub fn open(
         path: &Path,
-        stop: Option<&Stop>,
+        stop: Option<&StopFlag>,
         on_progress: &mut dyn FnMut(u64, u64),
     ) -> Result<Self, TapeError> {
         Self::of_file(open_recording(path)?.into(), stop, on_progress)
@@ -110,7 +109,7 @@ impl Tape {
     /// Like [`Tape::open`].
     pub fn of_file(
         file: Arc<File>,
-        stop: Option<&Stop>,
+        stop: Option<&StopFlag>,
         on_progress: &mut dyn FnMut(u64, u64),
     ) -> Result<Self, TapeError> {
         let mut log = IndexedLog::of_file(file, stop, on_progress)?;

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::io::{Read, Seek};
 
 use mcap::records::{Channel, MessageHeader, Record, op};
-use sim_host::Stop;
+use sim_messages::StopFlag;
 
 use super::content::ContentCheck;
 use super::finding::{CheckExtent, CheckReport, Findings, after_end_text, record_name};
@@ -32,7 +32,7 @@ const NOT_CHECKED_MAX: usize = 16;
 /// If the operating system reports an error, a signal has arrived, or the file is not a recording.
 pub fn check_file<R: Read + Seek>(
     source: R,
-    stop: Option<&Stop>,
+    stop: Option<&StopFlag>,
     on_progress: &mut dyn FnMut(u64, u64),
 ) -> Result<CheckReport, ReadError> {
     let mut scanner = RecordScanner::new(Window::new(source, stop.cloned())?)?;

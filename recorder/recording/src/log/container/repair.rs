@@ -12,7 +12,7 @@ use std::ops::Range;
 
 use mcap::records::{MessageIndex, Metadata, Record, op};
 use mcap::{Attachment, MAGIC};
-use sim_host::Stop;
+use sim_messages::StopFlag;
 
 use super::check::WRONG_CHECKSUM;
 use super::finding::{AfterEnd, Findings, RepairReport, record_name};
@@ -56,7 +56,7 @@ pub fn repair_file<R: Read + Seek, W: Write>(
     source: R,
     out: W,
     load: Option<LoadRows>,
-    stop: Option<&Stop>,
+    stop: Option<&StopFlag>,
     on_progress: &mut dyn FnMut(u64, u64),
 ) -> Result<RepairReport, RepairError> {
     let mut scanner = RecordScanner::new(Window::new(source, stop.cloned())?)?;

@@ -2,7 +2,7 @@
 
 use mcap::MAGIC;
 use mcap::records::{ChunkIndex, Footer, Record, op};
-use sim_host::Stop;
+use sim_messages::StopFlag;
 
 use crate::log::input_file::FileSource;
 use crate::log::read_error::{LogEnd, ReadError};
@@ -55,7 +55,7 @@ impl ChannelSet {
 /// can replace it.
 pub(super) fn read_index(
     file: FileSource,
-    stop: Option<&Stop>,
+    stop: Option<&StopFlag>,
 ) -> Result<Option<Vec<LocatedChunk>>, ReadError> {
     let mut window = Window::new(file, stop.cloned())?;
     let Some(start) = summary_start(&mut window)? else { return Ok(None) };
@@ -121,7 +121,7 @@ pub(in crate::log) fn summary_start(
 /// Returns the complete chunks of a file and the end of the file, from the headers of its records.
 pub(super) fn scan(
     file: FileSource,
-    stop: Option<&Stop>,
+    stop: Option<&StopFlag>,
     on_progress: &mut dyn FnMut(u64, u64),
 ) -> Result<(Vec<LocatedChunk>, LogEnd), ReadError> {
     let mut window = Window::new(file, stop.cloned())?.reading_little_ahead();

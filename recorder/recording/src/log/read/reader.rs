@@ -7,8 +7,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use mcap::records::{MessageHeader, Record, op};
-use sim_host::Stop;
-use sim_messages::ParticleState;
+use sim_messages::{ParticleState, StopFlag};
 
 use super::decode::{LoggedMessage, MessageDecoder};
 use super::records::RecordReader;
@@ -53,7 +52,7 @@ impl LogReader<FileSource> {
     ///
     /// # Errors
     /// Like [`LogReader::open`], and after a signal.
-    pub fn open_until(path: &Path, stop: &Stop) -> Result<Self, ReadError> {
+    pub fn open_until(path: &Path, stop: &StopFlag) -> Result<Self, ReadError> {
         Self::of_file(open_recording(path)?.into(), Some(stop))
     }
 
@@ -61,7 +60,7 @@ impl LogReader<FileSource> {
     ///
     /// # Errors
     /// Like [`LogReader::open_until`].
-    pub fn of_file(file: Arc<File>, stop: Option<&Stop>) -> Result<Self, ReadError> {
+    pub fn of_file(file: Arc<File>, stop: Option<&StopFlag>) -> Result<Self, ReadError> {
         Self::of_window(Window::growing(FileSource::new(file), stop.cloned()))
     }
 

@@ -2,7 +2,7 @@
 
 use std::io::{self, Read, Seek, SeekFrom};
 
-use sim_host::Stop;
+use sim_messages::StopFlag;
 
 use crate::log::read_error::{ReadError, check_stop};
 
@@ -23,7 +23,7 @@ pub(in crate::log) struct Window<R> {
     /// Bytes to read beyond those that are needed.
     ahead_size_bytes: usize,
     /// `None` if the program does not handle signals.
-    stop: Option<Stop>,
+    stop: Option<StopFlag>,
 }
 
 impl<R: Read> Window<R> {
@@ -97,13 +97,13 @@ impl<R: Read> Window<R> {
 
 impl<R: Read + Seek> Window<R> {
     /// Reads a file up to the end that it has now.
-    pub(in crate::log) fn new(mut source: R, stop: Option<Stop>) -> Result<Self, ReadError> {
+    pub(in crate::log) fn new(mut source: R, stop: Option<StopFlag>) -> Result<Self, ReadError> {
         let size_bytes = source.seek(SeekFrom::End(0))?;
         Ok(Self { size_bytes, ..Self::growing(source, stop) })
     }
 
     /// Reads a file up to the end that it has then.
-    pub(in crate::log) fn growing(source: R, stop: Option<Stop>) -> Self {
+    pub(in crate::log) fn growing(source: R, stop: Option<StopFlag>) -> Self {
         Self { seek: Some(R::seek), stop, ..Self::in_order(source) }
     }
 
