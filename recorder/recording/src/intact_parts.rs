@@ -34,7 +34,7 @@ impl IntactParts {
     /// If a repair is not possible, the operating system reports an error, or a signal has arrived.
     pub fn find(path: &Path, stop: &Stop) -> Result<Self, RepairError> {
         let file = Arc::new(open_recording(path)?);
-        let source = FileSource::new(Arc::clone(&file));
+        let source = FileSource::from(Arc::clone(&file));
         let report = repair_file(source, io::sink(), None, Some(stop), &mut |_, _| {})?;
         Ok(Self { file, load: load_rows(&report), report, stop: stop.clone() })
     }
@@ -55,7 +55,7 @@ impl IntactParts {
     /// If the operating system reports an error.
     pub fn bytes(&self) -> io::Result<RepairedBytes> {
         let (pipe, writer) = io::pipe()?;
-        let source = FileSource::new(Arc::clone(&self.file));
+        let source = FileSource::from(Arc::clone(&self.file));
         let (load, stop) = (self.load.clone(), self.stop.clone());
         let repair = move || {
             let out = BufWriter::with_capacity(BUFFER_SIZE_BYTES, writer);

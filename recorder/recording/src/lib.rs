@@ -50,12 +50,24 @@
 //! [`LogReader`] and [`FrameReader`] read a file from its start. [`Tape`] reads it at any step.
 //! [`simulation`] writes the recording of a scene, and [`verification`] simulates a recording again and
 //! compares every bit. No type of the mcap crate is part of this interface.
+//!
+//! # Features
+//!
+//! All features are on by default. Without them, the crate needs no C library and no operating system: it reads
+//! recordings from memory (`LogReader::new` and `Tape::of_file`), and writes them to any [`std::io::Write`].
+//!
+//! - `files`: opens recordings in files, and writes them under a temporary name until they are complete.
+//! - `pictures`: draws states as PNG and SVG.
+//! - `zstd`: reads and writes compressed chunks with the C libraries of zstd and LZ4. Without this feature, the crate
+//!   reads the same recordings with slower decompressors in Rust, and writes recordings without compression.
 #![forbid(unsafe_code)]
 
 mod complete_state;
 mod counted;
+#[cfg(feature = "files")]
 mod intact_parts;
 mod log;
+#[cfg(feature = "pictures")]
 pub mod pictures;
 #[cfg(test)]
 mod proof_tests;
@@ -69,11 +81,13 @@ pub use complete_state::{
     find_state, state_at_place,
 };
 pub use counted::counted;
+#[cfg(feature = "files")]
 pub use intact_parts::{IntactParts, RepairedBytes, load_rows};
 pub use log::*;
 pub use scene_drawing::{DrawnMesh, SCENE_TOPIC, SceneDrawing};
 pub use scene_state::{
     RecordedSceneError, SceneState, SceneStateError, SceneStates, recorded_scene, scene_to_simulate,
 };
+#[cfg(feature = "files")]
 pub use sim_host::{Existing, PartFile, PartFileError};
 pub use sim_solver::scene::Up;

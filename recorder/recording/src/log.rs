@@ -2,9 +2,11 @@
 //! the form of its outcomes.
 
 mod command_file;
+mod compression;
 mod container;
 pub(crate) mod encoding;
 mod index;
+#[cfg(feature = "files")]
 mod input_file;
 mod message;
 mod read;
@@ -12,12 +14,14 @@ mod read_error;
 mod rows;
 mod run;
 mod scanner;
+mod source;
 mod tape;
 mod tears;
 mod topic;
 mod writer;
 
 pub use command_file::{CommandFileError, TimedCommand, parse_commands, sort_commands};
+pub use compression::Compression;
 pub use container::check::check_file;
 pub use container::finding::{
     AfterEnd, CheckExtent, CheckReport, Cure, Finding, Findings, RepairReport,
@@ -30,7 +34,8 @@ pub use encoding::{
     encode_transform, map_from_world, scene_format,
 };
 pub use index::{ChunkEntry, IndexedLog};
-pub use input_file::{FileSource, open_recording, open_regular_file};
+#[cfg(feature = "files")]
+pub use input_file::{open_recording, open_regular_file};
 pub use message::{Backlog, Message};
 pub use read::decode::LoggedMessage;
 pub use read::frames::{Frame, FrameReader};
@@ -45,8 +50,10 @@ pub use rows::{
 };
 pub use run::selection::ContentSelection;
 pub use run::{CLOSING_METADATA, Closing, FORMAT_VERSION, RunDescription, SCENE_ATTACHMENT};
+pub use source::{FileSource, ReadAt};
 pub use tape::{Tape, TapeError, TapeState};
 pub use tears::{TearTracker, state_hash, torn_before_first};
 pub use topic::{AllCounts, Topic, TopicCounts};
+#[cfg(feature = "files")]
 pub(crate) use writer::replace_run_id;
-pub use writer::{Compression, LogOptions, LogWriter, WriteError};
+pub use writer::{LogOptions, LogWriter, WriteError};

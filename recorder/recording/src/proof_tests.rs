@@ -10,13 +10,15 @@ mod live;
 mod rows;
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
+use crate::complete_state::complete_state;
 use crate::log::{
-    Closing, LogEnd, LogOptions, LogReader, LogWriter, Message, OutcomeRow, SceneColliders,
-    TimedCommand, Topic, parse_commands,
+    Closing, Compression, LogEnd, LogOptions, LogReader, LogWriter, Message, OutcomeRow,
+    SceneColliders, Tape, TimedCommand, Topic, parse_commands,
 };
-use sim_messages::Action;
+use sim_messages::{Action, StopFlag};
 use sim_solver::{SOLVER_VERSION, Scene, Solver, builtin};
 
 use crate::simulation::{Job, SimulationResult, States, simulate};
@@ -46,10 +48,14 @@ fn job(scene: &str, commands: &str, steps: u64) -> Job {
 }
 
 fn record(job: &Job) -> (Vec<u8>, SimulationResult) {
+    record_with(job, Compression::default())
+}
+
+fn record_with(job: &Job, compression: Compression) -> (Vec<u8>, SimulationResult) {
     let solver = Solver::new(&job.scene);
     let (run, scene) = (job.description(&solver), job.scene.to_toml());
     // Small chunks, so that a truncated file still has some.
-    let options = LogOptions { chunk_size_bytes: 100_000, ..LogOptions::default() };
+    let options = LogOptions { compression, chunk_size_bytes: 100_000, ..LogOptions::default() };
     let mut log = LogWriter::create(Vec::new(), options, &run, scene.as_bytes(), 0).unwrap();
     log.describe_colliders(&SceneColliders::new(&job.scene)).unwrap();
     let outcomes =
@@ -129,6 +135,44 @@ fn a_simulated_recording_is_complete_and_bit_identical() {
         assert_eq!(report.to_string(), "300 steps bit-identical (0..=300)");
         assert_eq!((report.verdict, end), (Verdict::Identical, None));
         assert_eq!(outcomes.steps, 300);
+    }
+}
+
+#[test]
+fn a_recording_of_the_c_libraries_is_read_and_proved_in_rust() {
+    let read = |file: &[u8], is_in_rust| {
+        let mut log = LogReader::new(file).unwrap();
+        if is_in_rust {
+            log.decompress_in_rust();
+        }
+        let messages: Vec<_> = std::iter::from_fn(|| log.next_message().unwrap()).collect();
+        (messages, log.end().cloned().unwrap())
+    };
+    for compression in [Compression::Lz4, Compression::Zstd, Compression::ZstdSmallest] {
+        let (mut file, _) = record_with(&job("curtain", COMMANDS, 200), compression);
+        let whole = read(&file, true);
+        assert!(whole.0.len() > 400 && whole.1 == LogEnd::Complete);
+        assert!(whole == read(&file, false), "{compression:?}");
+        let mut log = LogReader::new(file.as_slice()).unwrap();
+        log.decompress_in_rust();
+        let report = verify(log, ALL, &AtomicBool::new(false), |_| {}).unwrap();
+        assert_eq!(report.to_string(), "200 steps bit-identical (0..=200)");
+        let middle = file.len() / 2;
+        file[middle] ^= 1;
+        let (messages, end) = read(&file, true);
+        assert!(matches!(end, LogEnd::Damaged { .. }), "{compression:?}: {end}");
+        assert!(whole.0.starts_with(&messages));
+    }
+}
+
+#[test]
+fn a_recording_in_memory_is_read_at_any_step() {
+    let (file, _) = record(&job("curtain", COMMANDS, 200));
+    let mut tape = Tape::of_file(Arc::new(file), None, &mut |_, _| {}).unwrap();
+    assert_eq!(tape.last_step(), 200);
+    for step in [150, 0, 77] {
+        let state = complete_state(&mut tape, step, u64::MAX, &StopFlag::default()).unwrap();
+        assert_eq!(state.state_hash, tape.state_at(step).unwrap().row.state_hash);
     }
 }
 

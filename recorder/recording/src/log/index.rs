@@ -7,17 +7,11 @@
 mod located;
 
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::ErrorKind;
-use std::os::unix::fs::FileExt;
-use std::path::Path;
-use std::sync::Arc;
+use std::io::{ErrorKind, Read};
 
 use mcap::records::{Record, op};
-
 use sim_messages::StopFlag;
 
-use super::input_file::{FileSource, open_recording};
 use super::read::decode::{LoggedMessage, MessageDecoder};
 use super::read::reader::{ChunkStart, LogReader};
 use super::read::records::parse_inner;
@@ -26,14 +20,16 @@ use super::run::RunDescription;
 use super::scanner::chunk::{Chunk, ChunkContent, InnerRecords};
 use super::scanner::limits::{RECORD_HEADER_SIZE_BYTES, SizeLimits};
 use super::scanner::split_header;
+use super::source::FileSource;
 use super::topic::Topic;
 use located::LocatedChunk;
+#[cfg(feature = "files")]
 pub(super) use located::summary_start;
 
 /// A recording with random access to its chunks. Clones read the same file, also on other threads.
 #[derive(Debug, Clone)]
 pub struct IndexedLog {
-    file: Arc<File>,
+    file: FileSource,
     run: RunDescription,
     scene: Vec<u8>,
     limits: SizeLimits,
@@ -76,35 +72,27 @@ impl ChunkEntry {
 }
 
 impl IndexedLog {
-    /// Opens a file and reads its header and its index.
-    ///
-    /// # Errors
-    /// If the file is not a recording or has no readable header.
-    pub fn open(path: &Path) -> Result<Self, ReadError> {
-        Self::of_file(open_recording(path)?.into(), None, &mut |_, _| {})
-    }
-
     /// Reads the header and the index of an open file. A scan of a file without an index calls `on_progress` with the bytes scanned
     /// and the size of the file. After a signal, this and every later read ends with
     /// [`ReadError::Interrupted`].
     ///
     /// # Errors
-    /// Like [`Self::open`].
+    /// If the file is not a recording or has no readable header.
     pub fn of_file(
-        file: Arc<File>,
+        file: impl Into<FileSource>,
         stop: Option<&StopFlag>,
         on_progress: &mut dyn FnMut(u64, u64),
     ) -> Result<Self, ReadError> {
-        let log = LogReader::of_file(Arc::clone(&file), stop)?;
+        let file = file.into();
+        let log = LogReader::of_file(file.at(0), stop)?;
         log.selection().require_all_particles("a reader of single steps")?;
         let limits = log.limits();
         let (run, scene) = (log.run().clone(), log.scene().to_vec());
-        let source = || FileSource::new(Arc::clone(&file));
-        let index = located::read_index(source(), stop)?;
+        let index = located::read_index(file.at(0), stop)?;
         let has_index = index.is_some();
         let (located, end) = match index {
             Some(located) => (located, LogEnd::Complete),
-            None => located::scan(source(), stop, on_progress)?,
+            None => located::scan(file.at(0), stop, on_progress)?,
         };
         let channels = BTreeMap::new();
         let (stop, chunks) = (stop.cloned(), Vec::new());
@@ -152,8 +140,9 @@ impl IndexedLog {
     /// # Errors
     /// If the operating system reports an error.
     pub fn reader(&self, stop: &StopFlag) -> Result<LogReader<FileSource>, ReadError> {
-        LogReader::of_file(Arc::clone(&self.file), Some(stop))
+        LogReader::of_file(self.file.at(0), Some(stop))
     }
+
     /// Returns the run that was recorded.
     pub fn run(&self) -> &RunDescription {
         &self.run
@@ -206,7 +195,7 @@ impl IndexedLog {
             )));
         }
         let mut bytes = vec![0; usize::try_from(size_bytes).unwrap_or(usize::MAX)];
-        match self.file.read_exact_at(&mut bytes, offset) {
+        match self.file.at(offset).read_exact(&mut bytes) {
             Err(error) if error.kind() == ErrorKind::UnexpectedEof => {
                 return Err(damaged("the file is shorter than its index says".to_owned()));
             }

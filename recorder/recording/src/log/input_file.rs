@@ -1,47 +1,71 @@
-//! Input files, which are opened without blocking and which several readers share.
+//! Recordings in files, which are opened without blocking.
 
 use std::fs::{self, File, FileType, OpenOptions};
-use std::io::{self, Read, Seek, SeekFrom};
+use std::io;
 use std::os::unix::fs::{FileExt, OpenOptionsExt};
 use std::path::Path;
 use std::sync::Arc;
 
 use rustix::fs::OFlags;
 use sim_host::{kind_of_non_file, part_path};
+use sim_messages::StopFlag;
 
+use super::index::IndexedLog;
+use super::read::reader::LogReader;
 use super::read_error::ReadError;
+use super::source::{FileSource, ReadAt};
+use super::tape::{Tape, TapeError};
 
-/// A file that several readers share, each with a position of its own.
-#[derive(Debug)]
-pub struct FileSource {
-    file: Arc<File>,
-    position: u64,
-}
+impl ReadAt for File {
+    fn read_at(&self, buffer: &mut [u8], position: u64) -> io::Result<usize> {
+        FileExt::read_at(self, buffer, position)
+    }
 
-impl FileSource {
-    /// Begins at the start of the file.
-    pub fn new(file: Arc<File>) -> Self {
-        Self { file, position: 0 }
+    fn size_bytes(&self) -> io::Result<u64> {
+        Ok(self.metadata()?.len())
     }
 }
 
-impl Read for FileSource {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let count = self.file.read_at(buffer, self.position)?;
-        self.position += count as u64;
-        Ok(count)
+impl LogReader<FileSource> {
+    /// Opens a file and reads its header.
+    ///
+    /// # Errors
+    /// If the file is not a recording or has no readable header.
+    pub fn open(path: &Path) -> Result<Self, ReadError> {
+        Self::of_file(Arc::new(open_recording(path)?), None)
+    }
+
+    /// Opens a file and reads its header. After a signal, this and every later read ends with
+    /// [`ReadError::Interrupted`].
+    ///
+    /// # Errors
+    /// Like [`LogReader::open`], and after a signal.
+    pub fn open_until(path: &Path, stop: &StopFlag) -> Result<Self, ReadError> {
+        Self::of_file(Arc::new(open_recording(path)?), Some(stop))
     }
 }
 
-impl Seek for FileSource {
-    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        let position = match to {
-            SeekFrom::Start(position) => Some(position),
-            SeekFrom::Current(offset) => self.position.checked_add_signed(offset),
-            SeekFrom::End(offset) => self.file.metadata()?.len().checked_add_signed(offset),
-        };
-        self.position = position.ok_or(io::ErrorKind::InvalidInput)?;
-        Ok(self.position)
+impl IndexedLog {
+    /// Opens a file and reads its header and its index.
+    ///
+    /// # Errors
+    /// If the file is not a recording or has no readable header.
+    pub fn open(path: &Path) -> Result<Self, ReadError> {
+        Self::of_file(Arc::new(open_recording(path)?), None, &mut |_, _| {})
+    }
+}
+
+impl Tape {
+    /// Opens a recording, like [`Tape::of_file`].
+    ///
+    /// # Errors
+    /// If the file is not a recording or has no snapshot.
+    pub fn open(
+        path: &Path,
+        stop: Option<&StopFlag>,
+        on_progress: &mut dyn FnMut(u64, u64),
+    ) -> Result<Self, TapeError> {
+        Self::of_file(Arc::new(open_recording(path)?), stop, on_progress)
     }
 }
 

@@ -3,14 +3,11 @@
 mod chunk_reader;
 mod search;
 
-use std::fs::File;
-use std::path::Path;
 use std::sync::Arc;
 
 use sim_messages::{ParticleState, StopFlag, Torn};
 
 use super::index::IndexedLog;
-use super::input_file::{FileSource, open_recording};
 use super::message::Message;
 use super::read::frames::FrameReader;
 use super::read_error::{LogEnd, ReadError};
@@ -18,6 +15,7 @@ use super::rows::{
     CollidersRow, ForcesRow, ParametersRow, StatusRow, StepRow, SurfaceRow, TopologyRow,
 };
 use super::run::RunDescription;
+use super::source::FileSource;
 use super::tears::{TearChange, TearTracker};
 use super::topic::Topic;
 use chunk_reader::ChunkReader;
@@ -89,26 +87,14 @@ impl TapeState {
 }
 
 impl Tape {
-    /// Opens a recording. A scan of a file without an index calls `on_progress` with the bytes
+    /// Reads a file that other readers may share. A scan of a file without an index calls `on_progress` with the bytes
     /// scanned and the size of the file. After a signal, this and every later read ends with
     /// [`ReadError::Interrupted`].
     ///
     /// # Errors
     /// If the file is not a recording or has no snapshot.
-    pub fn open(
-        path: &Path,
-        stop: Option<&StopFlag>,
-        on_progress: &mut dyn FnMut(u64, u64),
-    ) -> Result<Self, TapeError> {
-        Self::of_file(open_recording(path)?.into(), stop, on_progress)
-    }
-
-    /// Reads a file that is open, like [`Tape::open`].
-    ///
-    /// # Errors
-    /// Like [`Tape::open`].
     pub fn of_file(
-        file: Arc<File>,
+        file: impl Into<FileSource>,
         stop: Option<&StopFlag>,
         on_progress: &mut dyn FnMut(u64, u64),
     ) -> Result<Self, TapeError> {

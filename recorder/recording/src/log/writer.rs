@@ -1,5 +1,6 @@
 //! Writes a recording: append-only, in complete chunks, and nothing after the first error.
 
+#[cfg(feature = "files")]
 mod run_id;
 mod sink;
 
@@ -9,8 +10,10 @@ use std::io::{self, Read, Write};
 
 use mcap::records::{AttachmentHeader, MessageHeader, Metadata};
 use mcap::{Attachment, WriteOptions, Writer};
+#[cfg(feature = "files")]
 use sim_host::explain_write_error;
 
+use super::compression::Compression;
 use super::encoding::{MessageEncoder, ParticleBuffer, TopicFormat, encode_transform};
 use super::message::Message;
 use super::rows::ColliderDetails;
@@ -21,29 +24,17 @@ use super::run::{
     header_library,
 };
 use super::topic::{AllCounts, Topic};
+#[cfg(feature = "files")]
 pub(crate) use run_id::replace_run_id;
 use sink::{ChunkSink, SinkHandle};
 
 /// Bytes of an attachment to copy at a time.
 const COPY_SIZE_BYTES: usize = 1 << 18;
 
-/// Compression of the chunks of a file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Compression {
-    /// No compression: 0.2 ms per 10,000 particles.
-    None,
-    /// LZ4: 0.9 ms per 10,000 particles.
-    Lz4,
-    /// Zstandard level 1: 1.4 ms per 10,000 particles.
-    Zstd,
-    /// Zstandard level 19: about 100 ms per 10,000 particles.
-    ZstdSmallest,
-}
-
 /// Options of a [`LogWriter`].
 #[derive(Debug, Clone, Copy)]
 pub struct LogOptions {
-    /// Default: zstd.
+    /// Default: zstd. None without the feature `zstd`.
     pub compression: Compression,
     /// Uncompressed size at which a chunk is closed, in bytes. A killed process loses its open
     /// chunk. Default: 1 MiB.
@@ -55,7 +46,7 @@ pub struct LogOptions {
 impl Default for LogOptions {
     fn default() -> Self {
         Self {
-            compression: Compression::Zstd,
+            compression: Compression::default(),
             chunk_size_bytes: 1 << 20,
             selection: ContentSelection::default(),
         }
@@ -84,6 +75,8 @@ impl From<mcap::McapError> for WriteError {
 
 impl From<io::Error> for WriteError {
     fn from(error: io::Error) -> Self {
+        #[cfg(not(feature = "files"))]
+        let explain_write_error = io::Error::to_string;
         Self::Failed(explain_write_error(&error))
     }
 }
@@ -365,24 +358,11 @@ impl<W: Write> std::fmt::Debug for LogWriter<W> {
 }
 
 fn write_options(options: LogOptions) -> WriteOptions {
-    let compression = match options.compression {
-        Compression::None => None,
-        Compression::Lz4 => Some(mcap::Compression::Lz4),
-        Compression::Zstd | Compression::ZstdSmallest => Some(mcap::Compression::Zstd),
-    };
-    let level = match options.compression {
-        Compression::None | Compression::Lz4 => 0,
-        Compression::Zstd => 1,
-        Compression::ZstdSmallest => 19,
-    };
-    WriteOptions::new()
+    let written = WriteOptions::new()
         .profile("")
         .library(header_library(env!("CARGO_PKG_VERSION")) + mcap::LIBRARY_IDENTIFIER)
-        .chunk_size(Some(options.chunk_size_bytes))
-        .compression(compression)
-        .compression_level(level)
-        // The cores belong to the solver.
-        .compression_threads(0)
+        .chunk_size(Some(options.chunk_size_bytes));
+    options.compression.add_to(written)
 }
 
 /// Declares the selection. Nothing declares the default.

@@ -10,6 +10,7 @@ use mcap::{Attachment, WriteOptions, Writer};
 use super::content::{ContentCheck, Validity};
 use super::losses::Losses;
 use super::lost_load::LoadRows;
+use crate::log::compression::Compression;
 use crate::log::encoding::{MessageEncoder, TopicFormat, encode_transform};
 use crate::log::run::{CLOSING_METADATA, Closing, REPAIR_METADATA};
 use crate::log::topic::Topic;
@@ -75,21 +76,13 @@ pub(super) struct RepairWriter<W: Write> {
 
 impl<W: Write> RepairWriter<W> {
     pub(super) fn create(out: W, format: &Format) -> Result<Self, WriteError> {
-        // The level of a recording. Other compressions have none.
-        let (compression, level) = match format.compression.as_deref() {
-            Some("") => (None, 0),
-            Some("lz4") => (Some(mcap::Compression::Lz4), 0),
-            _ => (Some(mcap::Compression::Zstd), 1),
-        };
-        let file = WriteOptions::new()
+        let options = WriteOptions::new()
             .profile("")
             .library(format.library.as_str())
             .disable_seeking(true)
-            .chunk_size(Some(CHUNK_SIZE_BYTES))
-            .compression_level(level)
-            .compression(compression)
-            .compression_threads(0)
-            .create(NoSeek::new(out))?;
+            .chunk_size(Some(CHUNK_SIZE_BYTES));
+        let compression = Compression::as_in_chunks(format.compression.as_deref());
+        let file = compression.add_to(options).create(NoSeek::new(out))?;
         Ok(Self {
             file: Some(file),
             row: None,

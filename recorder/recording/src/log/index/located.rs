@@ -4,11 +4,11 @@ use mcap::MAGIC;
 use mcap::records::{ChunkIndex, Footer, Record, op};
 use sim_messages::StopFlag;
 
-use crate::log::input_file::FileSource;
 use crate::log::read_error::{LogEnd, ReadError};
 use crate::log::scanner::limits::RECORD_HEADER_SIZE_BYTES;
 use crate::log::scanner::window::Window;
 use crate::log::scanner::{FilePart, RecordScanner, split_header};
+use crate::log::source::FileSource;
 
 /// Most chunks of a file. At the usual chunk size this is 1 TB. Their index takes less than 200 MB
 /// of memory.

@@ -6,10 +6,10 @@ use sim_messages::ParticleState;
 
 use super::decode::LoggedMessage;
 use super::reader::{ChunkStart, LogReader};
-use crate::log::input_file::FileSource;
 use crate::log::message::{Backlog, Message, StepOrder};
 use crate::log::read_error::{LogEnd, ReadError};
 use crate::log::rows::StepRow;
+use crate::log::source::FileSource;
 use crate::log::topic::Topic;
 
 /// A snapshot and the messages between the previous snapshot and this one.

@@ -1,17 +1,13 @@
 //! Reads a recording from its start, with every checksum verified, as far as the file goes.
 
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::io::Read;
-use std::path::Path;
-use std::sync::Arc;
 
 use mcap::records::{MessageHeader, Record, op};
 use sim_messages::{ParticleState, StopFlag};
 
 use super::decode::{LoggedMessage, MessageDecoder};
 use super::records::RecordReader;
-use crate::log::input_file::{FileSource, open_recording};
 use crate::log::read_error::{LogEnd, ReadError};
 use crate::log::run::selection::{ContentSelection, SELECTION_METADATA};
 use crate::log::run::{
@@ -20,6 +16,7 @@ use crate::log::run::{
 };
 use crate::log::scanner::limits::SizeLimits;
 use crate::log::scanner::window::Window;
+use crate::log::source::FileSource;
 use crate::log::topic::Topic;
 
 /// Reads one recording from its start.
@@ -39,29 +36,16 @@ pub struct LogReader<R> {
 }
 
 impl LogReader<FileSource> {
-    /// Opens a file and reads its header.
-    ///
-    /// # Errors
-    /// If the file is not a recording or has no readable header.
-    pub fn open(path: &Path) -> Result<Self, ReadError> {
-        Self::of_file(open_recording(path)?.into(), None)
-    }
-
-    /// Opens a file and reads its header. After a signal, this and every later read ends with
+    /// Reads the header of a file that other readers may share. After a signal, this and every later read ends with
     /// [`ReadError::Interrupted`].
     ///
     /// # Errors
-    /// Like [`LogReader::open`], and after a signal.
-    pub fn open_until(path: &Path, stop: &StopFlag) -> Result<Self, ReadError> {
-        Self::of_file(open_recording(path)?.into(), Some(stop))
-    }
-
-    /// Reads a file that is open, and that other readers may share.
-    ///
-    /// # Errors
-    /// Like [`LogReader::open_until`].
-    pub fn of_file(file: Arc<File>, stop: Option<&StopFlag>) -> Result<Self, ReadError> {
-        Self::of_window(Window::growing(FileSource::new(file), stop.cloned()))
+    /// If the file is not a recording or has no readable header, and after a signal.
+    pub fn of_file(
+        file: impl Into<FileSource>,
+        stop: Option<&StopFlag>,
+    ) -> Result<Self, ReadError> {
+        Self::of_window(Window::growing(file.into(), stop.cloned()))
     }
 
     /// Continues at a chunk.
@@ -129,6 +113,12 @@ impl<R: Read> LogReader<R> {
                 }
             }
         }
+    }
+
+    /// Decompresses chunks in Rust, as without the feature `zstd`.
+    #[cfg(test)]
+    pub(crate) fn decompress_in_rust(&mut self) {
+        self.records.content.decompress = crate::log::compression::rust_decompressor();
     }
 
     pub(in crate::log) fn limits(&self) -> SizeLimits {

@@ -15,7 +15,7 @@ use crate::log::scanner::{FilePart, RecordScanner, SectionChecksum};
 /// Reads the records one by one and remembers how far the file is intact.
 pub(in crate::log) struct RecordReader<R> {
     scanner: RecordScanner<R>,
-    content: ChunkContent,
+    pub(super) content: ChunkContent,
     chunk: Option<ChunkPlace>,
     /// End of the last intact record, or of the chunk that contains it.
     intact_count: u64,

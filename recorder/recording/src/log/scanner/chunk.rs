@@ -1,9 +1,9 @@
 //! Chunks: the sizes that they claim, their content, and the records in it.
 
-use std::io::Read;
-
 use mcap::McapError;
 use mcap::records::{ChunkHeader, Record};
+
+use crate::log::compression::{Decompress, decompressor};
 
 use super::fields::{Unread, check_fields};
 use super::limits::{RECORD_HEADER_SIZE_BYTES, SizeLimits, compression_growth};
@@ -68,12 +68,17 @@ fn read_header(rest: &mut Unread<'_>) -> Option<ChunkHeader> {
 }
 
 /// The content of chunks, one at a time. Its memory is reused.
-#[derive(Default)]
 pub(in crate::log) struct ChunkContent {
     /// The chunk is compressed, so its content is not its data.
     is_compressed: bool,
     decompressed: Vec<u8>,
-    zstd: Option<zstd::bulk::Decompressor<'static>>,
+    pub(in crate::log) decompress: Decompress,
+}
+
+impl Default for ChunkContent {
+    fn default() -> Self {
+        Self { is_compressed: false, decompressed: Vec::new(), decompress: decompressor() }
+    }
 }
 
 impl ChunkContent {
@@ -84,14 +89,9 @@ impl ChunkContent {
         self.decompressed.clear();
         match chunk.header.compression.as_str() {
             "" => {}
-            // Within the limits of the scene.
-            "zstd" => {
-                self.read_zstd(chunk.data, usize::try_from(size_bytes).unwrap_or(usize::MAX))?;
-            }
-            "lz4" => {
-                let decoder = lz4::Decoder::new(chunk.data).map_err(|error| error.to_string())?;
-                let read = decoder.take(size_bytes + 1).read_to_end(&mut self.decompressed);
-                read.map_err(|error| error.to_string())?;
+            "zstd" | "lz4" => {
+                (self.decompress)(&chunk.header, chunk.data, &mut self.decompressed)
+                    .map_err(|error| error.to_string())?;
             }
             other => return Err(McapError::UnsupportedCompression(other.to_owned()).to_string()),
         }
@@ -106,16 +106,6 @@ impl ChunkContent {
             }
         }
         Ok(())
-    }
-
-    fn read_zstd(&mut self, data: &[u8], size_bytes: usize) -> Result<(), String> {
-        let zstd = match &mut self.zstd {
-            Some(zstd) => Ok(zstd),
-            none => zstd::bulk::Decompressor::new().map(|zstd| none.insert(zstd)),
-        };
-        self.decompressed.reserve_exact(size_bytes);
-        let read = zstd.and_then(|zstd| zstd.decompress_to_buffer(data, &mut self.decompressed));
-        read.map(drop).map_err(|error| error.to_string())
     }
 
     /// Returns the content of the chunk that was read last, from its data.

@@ -9,12 +9,12 @@ use std::sync::Arc;
 use mcap::records::{Record, op};
 
 use crate::log::index::summary_start;
-use crate::log::input_file::FileSource;
 use crate::log::read_error::ReadError;
 use crate::log::run::RUN_METADATA;
 use crate::log::scanner::limits::RECORD_HEADER_SIZE_BYTES;
 use crate::log::scanner::window::Window;
 use crate::log::scanner::{FilePart, RecordScanner};
+use crate::log::source::FileSource;
 
 /// Replaces the id, which has as many digits as before, and the checksum that covers it.
 ///
@@ -26,7 +26,7 @@ pub(crate) fn replace_run_id(path: &Path, old: u64, new: u64) -> io::Result<()> 
     }
     let file = Arc::new(OpenOptions::new().read(true).write(true).open(path)?);
     let [old, new] = [old, new].map(|id| format!("{id:016x}").into_bytes());
-    let mut window = Window::new(FileSource::new(Arc::clone(&file)), None)?;
+    let mut window = Window::new(FileSource::from(Arc::clone(&file)), None)?;
     let summary = summary_start(&mut window)?.ok_or(ErrorKind::InvalidData)?;
     let id_at = find_run_id(window, &old)?.ok_or(ErrorKind::InvalidData)?;
     // The record before the index is the end of the data, with the checksum of all bytes before it.
