@@ -75,7 +75,7 @@ pub(crate) fn run(args: &RunArgs) -> anyhow::Result<()> {
 }
 
 fn warn(scene: &Scene) {
-    for warning in scene.warnings() {
+    for warning in sim_solver::warnings(scene) {
         output::note(&format!("warning: {warning}"));
     }
 }

@@ -89,7 +89,7 @@ pub(crate) fn check(args: &CheckArgs) -> anyhow::Result<Exit> {
         rate_hz: scene.solver.rate_hz,
         substeps: scene.solver.substeps,
         iterations: scene.solver.iterations,
-        warnings: scene.warnings(),
+        warnings: sim_solver::warnings(&scene),
         name: scene.name,
     };
     if args.json {

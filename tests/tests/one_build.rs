@@ -7,13 +7,14 @@ use std::process::Command;
 
 /// Programs, as `cargo run` builds them, and every package, as `cargo test` does.
 const PROGRAMS: [&str; 5] = ["sim-node", "sim-c", "recorder", "viewer-bridge", "integration-tests"];
-const PACKAGES: [&str; 13] = [
+const PACKAGES: [&str; 14] = [
     "sim-c",
     "sim-types",
     "sim-host",
     "sim-messages",
     "sim-cli",
     "sim-contract",
+    "sim-scene",
     "sim-solver",
     "sim-lessons",
     "sim-node",

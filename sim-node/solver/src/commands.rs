@@ -7,13 +7,14 @@ pub(crate) mod plan;
 pub(crate) mod preparation;
 
 use glam::Vec3;
+use sim_scene::rotation::Pose;
 use sim_types::{
     Action, Affects, ConstraintKind, MovedObject, Parameter, ParameterValue, Part, ParticleFlags,
     Reason, Setting,
 };
 
 use crate::contacts::bodies::driven_body::BodyMotion;
-use crate::frame::{Frame, Pose};
+use crate::frame::Frame;
 use crate::solver::{Overfull, Solver};
 use crate::step::drive::{ActiveGrab, GRAB_HORIZON_S};
 use cut::Sphere;

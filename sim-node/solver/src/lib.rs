@@ -24,7 +24,6 @@
     reason = "a kernel that is not inlined is compiled for the baseline processor, and passes vectors in memory"
 )]
 
-pub mod builtin;
 mod checks;
 mod commands;
 mod constraints;
@@ -33,26 +32,27 @@ mod frame;
 mod kernels;
 mod motion;
 mod parameters;
-pub mod scene;
 mod solver;
 mod state;
 mod step;
 mod store;
+mod warnings;
 
 pub use commands::apply::{Applied, Control};
 pub use commands::cut::{Sphere, Sweep};
 pub use commands::preparation::{Plan, Prepared, Spare};
 pub use commands::{Grab, Push};
-pub use constraints::Constraint;
-pub use constraints::bends::{Bend, BendShape, RestShape};
-pub use constraints::sides::TornSides;
 pub use contacts::bodies::driven_body::BodyMotion;
 pub use contacts::colliders::PlacedCollider;
-pub use frame::Pose;
 pub use kernels::Kernels;
 pub use kernels::worker_pool::THREADS_MAX;
 pub use motion::MOTION_POINTS_MAX;
-pub use scene::{ColliderGeometry, Scene, SceneError, SolverSettings};
+pub use sim_scene::constraints::Constraint;
+pub use sim_scene::constraints::bends::{Bend, BendShape, RestShape};
+pub use sim_scene::constraints::sides::TornSides;
+pub use sim_scene::rotation::Pose;
+pub use sim_scene::scene::{ColliderGeometry, Scene, SceneError, SolverSettings};
+pub use sim_scene::{builtin, scene};
 pub use sim_types::{
     Action, BlockValue, COORDINATE_MAX, ConstraintKind, Method, OVER_S_MAX, PARAMETERS, Parameter,
     ParameterValue, ParameterValues, Part, ParticleFlags, Reason, Setting, TearCause,
@@ -64,6 +64,7 @@ pub use state::forces::{ColliderImpulse, Forces, FrameImpulse, ParticleImpulse};
 pub use state::keyframe::{Keyframe, KeyframeError};
 pub use state::particles::Particle;
 pub use state::restore::RestoreError;
+pub use warnings::warnings;
 
 /// Version of the arithmetic. It changes whenever a step produces other bits. Only the version that
 /// made a recording can re-simulate it.

@@ -3,9 +3,10 @@
 
 use glam::{DQuat, DVec3, Quat, Vec3};
 use serde::{Deserialize, Serialize};
+use sim_scene::rotation::Pose;
+use sim_scene::scene::Waypoint;
 
-use crate::frame::{Frame, Pose};
-use crate::scene::definition::anchor::Waypoint;
+use crate::frame::Frame;
 
 pub use sim_types::MOTION_POINTS_MAX;
 

@@ -3,16 +3,14 @@
 pub(crate) mod surfaces;
 
 use serde::{Deserialize, Serialize};
+use sim_scene::constraints::bends::Bend;
+use sim_scene::scene::{Limits, Scene};
 use sim_types::{
     Affects, KindFilter, OffMeaning, PARAMETERS, Parameter, ParameterInfo, ParameterValue,
     ParameterValues, Part, Parts, Reason, Setting,
 };
 
 use crate::checks::Context;
-use crate::constraints::bends::Bend;
-use crate::scene::definition::Scene;
-use crate::scene::definition::element::Limits;
-use crate::scene::definition::settings::parameter_values;
 use surfaces::Surfaces;
 
 /// Values that can change while a scene runs. Part of the state, and of a keyframe.
@@ -94,13 +92,6 @@ pub(crate) fn part_of_command(
         (None, None, Some(collider)) => Ok(Part::Collider(collider)),
         (Some(KindFilter::Known(kind)), None, None) => Ok(Part::Kind(kind)),
         _ => Err(Reason::OutOfRange),
-    }
-}
-
-impl Scene {
-    /// Returns the parameters of the scene. Its colliders have values of their own.
-    pub fn parameter_values(&self) -> ParameterValues {
-        parameter_values(self.gravity, &self.solver, &self.contact, self.wind.as_ref())
     }
 }
 

@@ -2,12 +2,16 @@
 
 use std::sync::Arc;
 
+use sim_scene::checks::StepSize;
+use sim_scene::constraints::Constraint;
+use sim_scene::constraints::bends::Bend;
+use sim_scene::memory::{ThreadedScene, check_memory, thread_bytes};
+use sim_scene::model::Model;
+use sim_scene::scene::{ContactMode, Scene, SceneAnchor, SolverSettings};
 use sim_types::{Parameter, ParameterValues, TearCause};
 
-use crate::checks::{Context, StepSize};
+use crate::checks::Context;
 use crate::commands::preparation::Prepared;
-use crate::constraints::Constraint;
-use crate::constraints::bends::Bend;
 use crate::constraints::builder::{ConstraintBuilder, Setup};
 use crate::constraints::order::ProjectionOrders;
 use crate::constraints::tethers::{TetherBasis, Tethers};
@@ -18,12 +22,6 @@ use crate::contacts::obstacle::{OBSTACLES_PER_COLLIDER, Obstacle};
 use crate::contacts::pairs::ParticleContacts;
 use crate::kernels::Kernels;
 use crate::parameters::Parameters;
-use crate::scene::definition::Scene;
-use crate::scene::definition::anchor::SceneAnchor;
-use crate::scene::definition::settings::ContactMode;
-use crate::scene::definition::settings::{SolverSettings, substep_length};
-use crate::scene::model::Model;
-use crate::scene::{ThreadedScene, check_memory, thread_bytes};
 use crate::state::forces::{Forces, Measured, Measurement};
 use crate::state::hash::state_hash;
 use crate::state::particles::{Particle, Particles};
@@ -357,8 +355,9 @@ impl Solver {
     }
 
     pub(crate) fn setup(&self, parameters: &Parameters) -> Setup {
-        let h = substep_length(self.settings.rate_hz, parameters.values.count(Parameter::Substeps));
-        Setup { method: self.settings.method, h }
+        let substeps = parameters.values.count(Parameter::Substeps);
+        let settings = SolverSettings { substeps, ..self.settings };
+        Setup { method: settings.method, h: settings.h() }
     }
 
     /// Derives the tethers from the current state, if the scene has any.
@@ -435,7 +434,7 @@ impl Solver {
 
     /// Length of a step in seconds.
     pub(crate) fn step_length(&self) -> f32 {
-        substep_length(self.settings.rate_hz, 1)
+        SolverSettings { substeps: 1, ..self.settings }.h()
     }
 
     /// Time of the scene at `scene_step`, in seconds.

@@ -290,11 +290,11 @@ mod tests {
     //! Calls after a panic within a step.
     use std::panic::{AssertUnwindSafe, catch_unwind};
 
+    use sim_scene::scene::Scene;
     use sim_types::{Action, ParameterValue};
 
     use super::*;
     use crate::commands::cut::Sphere;
-    use crate::scene::Scene;
 
     type Call = fn(&mut Solver) -> String;
 

@@ -17,6 +17,10 @@ pub(crate) mod strays;
 mod survey;
 pub(crate) mod workers;
 
+use sim_scene::constraints::families::Sheet;
+use sim_scene::constraints::sides::TornSides;
+use sim_scene::model::Model;
+
 use bends::StoredBends;
 use crowd::{Crowd, find_figures};
 use graph::Graph;
@@ -31,17 +35,14 @@ use survey::Survey;
 use workers::Workers;
 
 use crate::constraints::column_writer::ColumnWriter;
-use crate::constraints::families::Sheet;
 use crate::constraints::fields::Pass;
 use crate::constraints::order::ProjectionOrders;
 use crate::constraints::parameters::ConstraintParameters;
 use crate::constraints::projection::TearMark;
-use crate::constraints::sides::TornSides;
 use crate::contacts::contact::ContactRoom;
 use crate::kernels::Kernels;
 use crate::kernels::lanes::PackedParticle;
 use crate::parameters::Parameters;
-use crate::scene::model::Model;
 use crate::state::particles::Particle;
 use crate::step::substep::SubstepInputs;
 use crate::step::wind::WindStep;
@@ -441,8 +442,9 @@ mod tests {
     //! bit is tested with the kernels.
     use std::sync::atomic::AtomicBool;
 
+    use sim_scene::scene::Scene;
+
     use super::*;
-    use crate::scene::Scene;
     use crate::solver::Solver;
     use crate::step::prediction::Prediction;
 

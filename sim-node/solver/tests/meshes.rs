@@ -18,11 +18,11 @@ fn mesh_scene(obj: &str, keys: &str) -> Result<Scene, SceneError> {
 fn faces_with_vertices_of_their_own_cause_a_warning() {
     // Two triangles of a quad; the corners that they share are there twice, one with a negative zero.
     let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 0 -0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 4 5 6\n";
-    let warnings = mesh_scene(obj, "").unwrap().warnings();
+    let warnings = sim_solver::warnings(&mesh_scene(obj, "").unwrap());
     let expected = "generate[0]: 2 of its 6 particles start where another one does";
     assert!(warnings.iter().any(|one| one.starts_with(expected)), "{warnings:?}");
     let whole = mesh_scene("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\nf 2 4 3\n", "").unwrap();
-    assert!(!whole.warnings().iter().any(|one| one.contains("another one")));
+    assert!(!sim_solver::warnings(&whole).iter().any(|one| one.contains("another one")));
 }
 
 /// Faces of a sheet.
@@ -151,7 +151,10 @@ fn degenerate_parts_are_omitted_with_a_warning_and_the_rest_stays_finite() {
         let warnings: Vec<_> =
             scene.read_warnings.iter().map(|one| one.trim_start_matches("mesh.obj: ")).collect();
         assert_eq!(warnings, if warning.is_empty() { vec![] } else { vec![warning] });
-        assert!(scene.warnings().iter().any(|one| one.contains(warning)) || warning.is_empty());
+        assert!(
+            sim_solver::warnings(&scene).iter().any(|one| one.contains(warning))
+                || warning.is_empty()
+        );
         assert_finite_for(&scene, 10_000);
     }
 }
@@ -202,7 +205,7 @@ fn a_mesh_can_be_placed_any_number_of_times_and_keeps_its_pins() {
 fn pins_that_match_nothing_are_named_with_the_coordinates_of_the_mesh() {
     let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
     let keys = "origin = [10, 0, 0]\npinned = \"x > 5\"";
-    let warnings = mesh_scene(obj, keys).unwrap().warnings().join("\n");
+    let warnings = sim_solver::warnings(&mesh_scene(obj, keys).unwrap()).join("\n");
     let expected =
         "generate[0].pinned matches no particle of the shape (x 0 to 1, y 0 to 1, z 0 to 0)";
     assert_eq!(warnings, expected);
@@ -283,7 +286,11 @@ fn names_that_make_the_text_too_long_are_omitted_with_a_warning() {
     assert!(!scene.to_toml().contains("materials"));
     let warning =
         "texture coordinates, groups and materials are omitted, because the text of the scene";
-    assert!(scene.warnings().iter().any(|one| one.starts_with(warning)), "{:?}", scene.warnings());
+    assert!(
+        sim_solver::warnings(&scene).iter().any(|one| one.starts_with(warning)),
+        "{:?}",
+        sim_solver::warnings(&scene)
+    );
 }
 
 #[test]

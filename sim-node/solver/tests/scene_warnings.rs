@@ -1,13 +1,13 @@
 //! Warnings about scenes that work, but probably not as intended.
 
-use sim_solver::Scene;
+use sim_solver::{Scene, builtin};
 
 /// Two particles, 1 m apart, with a rigid constraint.
 const PAIR: &str = "[[particle]]\nposition = [0, 0, 0]\n[[particle]]\nposition = [1, 0, 0]\n\
      [[constraint]]\nparticles = [0, 1]\n";
 
 fn warnings(text: &str) -> Vec<String> {
-    Scene::from_toml(&format!("version = 1\n{text}"), "test").unwrap().warnings()
+    sim_solver::warnings(&Scene::from_toml(&format!("version = 1\n{text}"), "test").unwrap())
 }
 
 /// Asserts that a scene has one warning, which begins with these words.
@@ -16,6 +16,14 @@ fn assert_warns(text: &str, expected: &str) {
     let warnings = warnings(text);
     assert_eq!(warnings.len(), 1, "{text}\n{warnings:?}");
     assert!(warnings[0].starts_with(expected), "{}\n  instead of\n{expected}", warnings[0]);
+}
+
+#[test]
+fn builtin_scenes_cause_no_warning() {
+    for name in builtin::names() {
+        let scene = Scene::from_toml(builtin::text(name).unwrap(), name).unwrap();
+        assert_eq!(sim_solver::warnings(&scene), Vec::<String>::new(), "{name}");
+    }
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::{Context, anyhow};
 use sim_host::{Existing, PartFile, read_scene_file};
 use sim_solver::scene::SceneProblem;
-use sim_solver::{Scene, SceneError};
+use sim_solver::{Scene, SceneError, warnings};
 
 use crate::args::ImportArgs;
 use crate::output;
@@ -18,7 +18,7 @@ pub(crate) fn import(args: &ImportArgs) -> anyhow::Result<()> {
     let scene = Scene::from_toml_with_files(&text, &args.mesh, &|_| Ok(mesh.clone()))
         .map_err(import_error)?;
     let counts = scene.counts();
-    for warning in scene.warnings() {
+    for warning in warnings(&scene) {
         // The user knows the only generator by the options.
         let warning = warning.replace("generate[0].pinned", "--pin");
         let warning = warning.replace("generate[0].bending", "--bending");
@@ -157,8 +157,8 @@ mod tests {
         let mesh = "v 0 0 0\nv 100 0 0\nv 0 145 0\nf 1 2 3\n";
         let scaled = scene(mesh, &["--scale", "0.01", "--pin", "y > 1.4"]).unwrap();
         assert_eq!(scaled.counts().pins, 1);
-        assert_eq!(scaled.warnings(), Vec::<String>::new());
-        let warnings = scene(mesh, &["--pin", "y > 150"]).unwrap().warnings().join("\n");
+        assert_eq!(warnings(&scaled), Vec::<String>::new());
+        let warnings = warnings(&scene(mesh, &["--pin", "y > 150"]).unwrap()).join("\n");
         assert!(
             warnings.contains("give a mesh in another unit a `scale`, such as 0.01 "),
             "{warnings}"

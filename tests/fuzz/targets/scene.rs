@@ -3,7 +3,7 @@
 
 use fuzz::simulation::Pair;
 use libfuzzer_sys::fuzz_target;
-use sim_solver::Scene;
+use sim_solver::{Scene, warnings};
 
 /// Most digits of a whole number in the text. Greater numbers find nothing new, but make large scenes.
 const WHOLE_NUMBER_DIGITS_MAX: usize = 3;
@@ -21,7 +21,7 @@ fuzz_target!(|text: &str| {
     let printed = scene.to_toml();
     let again = Scene::from_toml(&printed, "scene.toml").expect("a printed scene is valid");
     assert_eq!(Scene { read_warnings: scene.read_warnings.clone(), ..again }, scene);
-    _ = scene.warnings();
+    _ = warnings(&scene);
     let counts = scene.counts();
     if counts.particles.max(counts.constraints) <= ELEMENTS_MAX {
         step(&scene);

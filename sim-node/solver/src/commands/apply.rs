@@ -1,5 +1,6 @@
 //! Applies actions: the only way from a command to the state.
 
+use sim_scene::rotation::Pose;
 use sim_types::{
     Action, CLIENT_ID_END, MovedObject, Parameter, ParameterValue, Part, Reason, Text,
 };
@@ -8,7 +9,6 @@ use super::cut::{Sphere, Sweep};
 use super::moves::Follow;
 use super::{Grab, Push};
 use crate::contacts::bodies::driven_body::BodyMotion;
-use crate::frame::Pose;
 use crate::parameters::part_of_command;
 use crate::solver::Solver;
 

@@ -1,10 +1,10 @@
 //! Cuts: a single constraint, all around a point, or all that cross the path of a cursor.
 
 use glam::{DVec3, Vec3};
+use sim_scene::constraints::Constraint;
 
 use sim_types::{Action, Reason, TearCause};
 
-use crate::constraints::Constraint;
 use crate::solver::Solver;
 
 /// The path of a cursor, extended along the direction of view to a strip that cuts the constraints

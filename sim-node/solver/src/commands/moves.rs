@@ -1,9 +1,10 @@
 //! Commands that move anchors and colliders, and lead them and grabbed particles along points in time.
 
 use glam::Vec3;
+use sim_scene::rotation::Pose;
 use sim_types::{Action, MovedObject, PathPoint, Reason};
 
-use crate::frame::{Frame, Pose};
+use crate::frame::Frame;
 use crate::motion::{MOTION_POINTS_MAX, Motion, steps_at};
 use crate::solver::Solver;
 

@@ -165,10 +165,10 @@ impl Solver {
 
 #[cfg(test)]
 mod tests {
+    use sim_scene::scene::Scene;
     use sim_types::ParameterValue;
 
     use super::*;
-    use crate::scene::Scene;
 
     #[test]
     fn a_state_is_planned_with_the_surfaces_of_its_keyframe() {

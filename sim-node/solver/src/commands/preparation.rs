@@ -7,15 +7,15 @@
 
 use std::sync::Arc;
 
+use sim_scene::model::Model;
+use sim_scene::scene::{ConstraintOrder, ContactMode};
+
 use crate::constraints::builder::{ConstraintBuilder, Setup};
 use crate::constraints::order::ProjectionOrders;
 use crate::constraints::tethers::{TetherBasis, Tethers};
 use crate::contacts::pairs::ParticleContacts;
 use crate::kernels::Kernels;
 use crate::parameters::Parameters;
-use crate::scene::definition::settings::ConstraintOrder;
-use crate::scene::definition::settings::ContactMode;
-use crate::scene::model::Model;
 use crate::store::{ParticleStore, SceneFields};
 
 /// Constraints, tethers and contacts to derive.

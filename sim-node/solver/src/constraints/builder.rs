@@ -2,16 +2,16 @@
 
 use std::cell::Cell;
 
+use sim_scene::constraints::Constraint;
+use sim_scene::model::Model;
+use sim_scene::scene::Limits;
 use sim_types::{ConstraintKind, Method, Parameter, TearCause};
 
-use super::Constraint;
 use super::fields::ConstraintFields;
 use super::parameters::{ConstraintParameters, LimitLengths, PassSoftness};
 use super::projection::TearMark;
 use super::separation::RestLength;
 use crate::parameters::Parameters;
-use crate::scene::definition::element::Limits;
-use crate::scene::model::Model;
 
 /// Builds the parameters of each constraint.
 pub(crate) struct ConstraintBuilder<'a> {

@@ -5,8 +5,8 @@
 
 use std::ops::Range;
 
-use crate::scene::definition::settings::ConstraintOrder;
-use crate::scene::model::Model;
+use sim_scene::model::Model;
+use sim_scene::scene::ConstraintOrder;
 
 /// Largest number of groups of independent constraints. The rest go into one serial group after
 /// them, which only a particle with more than 32 constraints needs, such as the hub of a web.
@@ -167,8 +167,9 @@ mod tests {
     //! Independence and completeness of the groups, on structured and on irregular scenes.
     use std::collections::BTreeSet;
 
+    use sim_scene::scene::Scene;
+
     use super::*;
-    use crate::scene::Scene;
 
     fn model(text: &str) -> Model {
         Scene::from_toml(text, "test").unwrap().model()

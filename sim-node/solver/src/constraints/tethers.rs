@@ -4,11 +4,11 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
+use sim_scene::model::Model;
+use sim_scene::scene::Softness;
 use sim_types::{ConstraintKind, ParticleFlags};
 
 use crate::parameters::Parameters;
-use crate::scene::definition::element::Softness;
-use crate::scene::model::Model;
 use crate::state::particles::Particles;
 use crate::state::tear::Torn;
 use crate::store::{Location, ParticleStore, TetherEnds, TetherPlace};

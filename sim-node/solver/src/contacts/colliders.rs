@@ -3,16 +3,17 @@
 use std::sync::Arc;
 
 use glam::{DVec3, Quat, Vec3};
+use sim_scene::rotation::rotation_about;
+use sim_scene::scene::{ColliderBody, ColliderGeometry, SceneCollider};
 use sim_types::Reason;
 
 use super::bodies::driven_body::{BodyMotion, BodyState, DrivenBody};
 use super::contact_substep::ContactSubstep;
 use super::mesh::collision_mesh::CollisionMesh;
 use super::placed_shape::PlacedShape;
-use crate::frame::{Frame, angular_velocity, rotation_about};
+use crate::frame::{Frame, angular_velocity};
 use crate::motion::{Motion, Path};
 use crate::parameters::surfaces::ColliderSurface;
-use crate::scene::definition::collider::{ColliderBody, ColliderGeometry, SceneCollider};
 
 /// A collider and its motion.
 #[derive(Debug, Clone)]

@@ -18,13 +18,14 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use glam::Vec3;
+use sim_scene::collider_mesh::TOLERANCE;
 
 use super::bounds::Bounds;
 use super::hit::Hit;
 use super::path::SubstepPath;
 use super::placed_frame::PlacedFrame;
 use super::zone::Zone;
-use collision_mesh::{CollisionMesh, TOLERANCE};
+use collision_mesh::CollisionMesh;
 use inside::SurfacePoint;
 use near::{NearMeshes, NearQuery, NearTriangles};
 pub(crate) use triangle::MeshPath;

@@ -1,6 +1,7 @@
 //! Obstacles: colliders as the particles of one substep meet them.
 
 use glam::Vec3;
+use sim_scene::scene::SceneCollider;
 
 use super::colliders::Collider;
 use super::contact_substep::{ContactSubstep, Interval};
@@ -9,7 +10,6 @@ use super::solid::{Solid, solids};
 use super::zone::Zone;
 use crate::kernels::lanes::Lanes;
 use crate::kernels::vectors::{cross, difference, dot, scaled, splat, sum, sum_of_magnitudes};
-use crate::scene::definition::collider::SceneCollider;
 
 /// A collider in one substep, or one face of bounds.
 #[derive(Debug, Clone)]

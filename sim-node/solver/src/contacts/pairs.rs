@@ -20,6 +20,9 @@ mod surfaces;
 mod tile;
 mod tile_tree;
 
+use sim_scene::model::Model;
+use sim_scene::scene::ContactMode;
+
 use box_tree::Search;
 use gathered::{Gathered, Room};
 pub(crate) use load::{CONNECTED_REACH, PAIRS_PER_PARTICLE};
@@ -34,8 +37,6 @@ use tile_tree::{Query, TileTree, search_order};
 
 use crate::kernels::Kernels;
 use crate::kernels::lanes::PackedParticle;
-use crate::scene::definition::settings::ContactMode;
-use crate::scene::model::Model;
 use crate::state::tear::Torn;
 use crate::step::substep::Substep;
 use crate::store::strays::StrayMarks;
@@ -413,8 +414,9 @@ fn without_corners(left_out: LaneMasks, loose: &[u16], tiles: [u32; 2]) -> LaneM
 #[cfg(test)]
 mod tests {
     //! The search against the law: no result depends on how and when candidates are found.
+    use sim_scene::scene::Scene;
+
     use super::*;
-    use crate::scene::Scene;
     use crate::solver::Solver;
 
     /// A cloth that falls on its edge and folds, and a rope that falls on it.

@@ -1,9 +1,10 @@
 //! Shapes of colliders at their current pose.
 
 use glam::{Quat, Vec3};
+use sim_scene::rotation::Pose;
+use sim_scene::scene::ColliderGeometry;
 
-use crate::frame::{Frame, Pose};
-use crate::scene::definition::collider::ColliderGeometry;
+use crate::frame::Frame;
 
 /// The shape of a collider at its current pose.
 #[derive(Debug, Clone, Copy, PartialEq)]

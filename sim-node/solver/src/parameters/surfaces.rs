@@ -1,10 +1,10 @@
 //! The surfaces of colliders: friction and restitution, which can change while a scene runs.
 
 use serde::{Deserialize, Serialize};
+use sim_scene::scene::SceneCollider;
 use sim_types::{Parameter, Part, Setting};
 
 use crate::checks::Context;
-use crate::scene::definition::collider::SceneCollider;
 
 /// Friction and restitution of a collider.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
+use sim_scene::constraints::bends::{Bend, BendShape};
+use sim_scene::constraints::sides::TornSides;
+use sim_scene::model::Model;
+use sim_scene::scene::Scene;
 use sim_types::{ConstraintKind, Method, Parameter, ParameterValues};
 
-use crate::constraints::bends::{Bend, BendShape};
-use crate::constraints::sides::TornSides;
-use crate::scene::Scene;
-use crate::scene::model::Model;
 use crate::solver::Solver;
 use crate::state::particles::Particle;
 
@@ -44,16 +44,6 @@ impl Energy {
             energy.potential -= mass * gravity.dot(vector(particle.position));
         }
         energy
-    }
-}
-
-impl Scene {
-    /// Returns the unit of [`Energy`]: "J" for metres, and for another unit of length a unit such as "kg cm²/s²".
-    pub fn energy_unit(&self) -> String {
-        match self.unit.as_str() {
-            "m" => "J".to_owned(),
-            unit => format!("kg {unit}²/s²"),
-        }
     }
 }
 

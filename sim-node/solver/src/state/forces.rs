@@ -1,11 +1,11 @@
 //! Forces on what particles cannot move: colliders, anchors and fixed particles.
 
 use glam::{DVec3, Vec3};
+use sim_scene::model::Model;
 use sim_types::ParticleFlags;
 
 use crate::constraints::tethers::Tethers;
 use crate::contacts::contact::reaction::Reaction;
-use crate::scene::model::Model;
 use crate::state::particles::Particle;
 use crate::step::anchors::Anchors;
 use crate::store::ParticleStore;

@@ -1,13 +1,14 @@
 //! Keyframes: the state beside the particles of a snapshot.
 
 use serde::{Deserialize, Serialize};
+use sim_scene::rotation::Pose;
 use thiserror::Error;
 
 use glam::{Quat, Vec3};
 use sim_types::{ParameterValues, ParticleFlags, SETTINGS_COUNT, TearCause};
 
 use crate::constraints::tethers::TetherBasis;
-use crate::frame::{Frame, Pose};
+use crate::frame::Frame;
 use crate::motion::{MOTION_POINTS_MAX, MOTION_SIZE_BYTES_MAX, Motion, MotionState};
 use crate::parameters::{Parameters, SETTING_SIZE_BYTES_MAX};
 use crate::solver::Solver;

@@ -1,9 +1,8 @@
 //! The state of the particles between two steps, as it is published.
 
 use bytemuck::{Pod, Zeroable};
+use sim_scene::scene::SceneParticle;
 use sim_types::ParticleFlags;
-
-use crate::scene::definition::element::SceneParticle;
 
 /// A particle as it is published and hashed: 32 bytes, little-endian, without padding.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]

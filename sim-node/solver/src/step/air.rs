@@ -1,6 +1,6 @@
 //! The air around the surface of a scene.
 
-use crate::scene::definition::settings::Wind;
+use sim_scene::scene::Wind;
 
 /// The air around the surface of a scene.
 #[derive(Debug, Clone, Default)]

@@ -1,14 +1,13 @@
 //! Anchors: moving frames, and the particles that follow them.
 
 use glam::Vec3;
+use sim_scene::scene::{SceneAnchor, SceneParticle};
 
 use sim_types::ParticleFlags;
 
 use super::drive::{DriveTarget, drive_towards};
 use crate::frame::Frame;
 use crate::motion::{Motion, Path};
-use crate::scene::definition::anchor::SceneAnchor;
-use crate::scene::definition::element::SceneParticle;
 use crate::state::particles::{Particle, Particles};
 use crate::store::ParticleStore;
 

@@ -1,8 +1,9 @@
 //! Where the bends of a scene are stored, and which of them have no effect because of tears.
 
+use sim_scene::constraints::sides::TornSides;
+use sim_scene::model::Model;
+
 use super::layout::Location;
-use crate::constraints::sides::TornSides;
-use crate::scene::model::Model;
 
 /// The bends of a store.
 #[derive(Debug, Clone, Default)]

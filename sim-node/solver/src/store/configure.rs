@@ -1,19 +1,19 @@
 //! Derives the constraints of a store from the scene, the parameters and the tears.
 
+use sim_scene::constraints::bends::families::BendFamily;
+use sim_scene::constraints::families::Family;
+use sim_scene::constraints::sides::TornSides;
+use sim_scene::model::Model;
 use sim_types::Affects;
 
 use super::ParticleStore;
 use super::graph::block::BLOCK_GROUPS;
 use super::layout::{Configured, Location, SceneFields};
 use super::patch::sheets::find_sheet;
-use crate::constraints::bends::families::BendFamily;
 use crate::constraints::builder::ConstraintBuilder;
-use crate::constraints::families::Family;
 use crate::constraints::fields::ConstraintFields;
 use crate::constraints::parameters::ConstraintParameters;
-use crate::constraints::sides::TornSides;
 use crate::parameters::Parameters;
-use crate::scene::model::Model;
 
 impl ParticleStore {
     /// Derives the constraints, as far as they depend on what has changed since the last call. Torn

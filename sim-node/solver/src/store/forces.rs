@@ -1,15 +1,15 @@
 //! The measurement of what particles do to colliders and fixed particles.
 
 use glam::DVec3;
+use sim_scene::constraints::Constraint;
+use sim_scene::model::Model;
 
 use super::graph::Graph;
 use super::graph::forces::Projections;
 use super::pulls::{Pull, TetherEnds};
 use super::rows::RowForces;
 use super::{Location, ParticleStore};
-use crate::constraints::Constraint;
 use crate::contacts::contact::reaction::{Reaction, ReactionRoom, take_impulses};
-use crate::scene::model::Model;
 use crate::state::particles::Particle;
 
 /// The particles of a constraint or bend, with the coefficients of its gradient.
@@ -125,7 +125,7 @@ impl ParticleStore {
         }
     }
 
-    /// A constraint or bend with this number in [`Incidence`](crate::constraints::incidence::Incidence).
+    /// A constraint or bend with this number in [`Incidence`](sim_scene::constraints::incidence::Incidence).
     fn link(&self, model: &Model, projections: &Projections, number: u32) -> Link {
         let number = number as usize;
         match number.checked_sub(model.constraints.len()) {

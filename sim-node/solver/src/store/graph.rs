@@ -9,6 +9,9 @@ mod indices;
 mod measure;
 mod wind;
 
+use sim_scene::constraints::sides::TornSides;
+use sim_scene::model::Model;
+
 use batch::Batch;
 use bends::GraphBends;
 use block::{BLOCK_GROUPS, BlockWork, GraphBlock, PackedTether};
@@ -27,12 +30,10 @@ use crate::constraints::columns::{ConstraintColumns, FullPass};
 use crate::constraints::fields::Pass;
 use crate::constraints::order::ProjectionOrder;
 use crate::constraints::parameters::{ConstraintParameters, PassSoftness};
-use crate::constraints::sides::TornSides;
 use crate::kernels::Kernels;
 use crate::kernels::huge_pages::refill;
 use crate::kernels::lanes::{Lanes8, PackedParticle};
 use crate::kernels::vectors::lane_of;
-use crate::scene::model::Model;
 use crate::state::particles::Particle;
 use crate::step::schedule::{Schedule, ScheduledStage};
 use crate::step::stage::Stage;

@@ -14,6 +14,10 @@ mod wind;
 
 use std::ops::Range;
 
+use sim_scene::constraints::bends::families::BendFamily;
+use sim_scene::constraints::families::{Family, Sheet};
+use sim_scene::constraints::sides::TornSides;
+
 use band::LentRows;
 use band_forces::LentForces;
 use bands::Bands;
@@ -26,12 +30,9 @@ use super::layout::Layout;
 use super::rows::{RowLayout, Rows};
 use super::survey::FamilySoftness;
 use super::workers::Workers;
-use crate::constraints::bends::families::BendFamily;
 use crate::constraints::column_writer::{ColumnOrder, ColumnWriter};
-use crate::constraints::families::{Family, Sheet};
 use crate::constraints::fields::Pass;
 use crate::constraints::parameters::ConstraintParameters;
-use crate::constraints::sides::TornSides;
 use crate::kernels::Kernels;
 use crate::kernels::lent_slice::LentSlice;
 use crate::state::particles::Particle;

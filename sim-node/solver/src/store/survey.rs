@@ -1,6 +1,7 @@
 //! Properties that the constraints of a scene have with the current parameters.
 
-use crate::constraints::families::Family;
+use sim_scene::constraints::families::Family;
+
 use crate::constraints::fields::ConstraintFields;
 use crate::constraints::parameters::{ConstraintParameters, LimitLengths, PassSoftness};
 

@@ -120,7 +120,7 @@ export class Topology {
   }
 
   /** True if constraints join the ends of the edge from a corner to the next, and all of them are gone: the solver's rule
-   * (TornSides in sim-node/solver/src/constraints/sides.rs), by which such a triangle catches no wind and touches nothing. @param {number} corner */
+   * (TornSides in sim-node/scene/src/constraints/sides.rs), by which such a triangle catches no wind and touches nothing. @param {number} corner */
   isTornSide(corner) {
     const members = this.edgeConstraints.at(corner);
     return members.length > 0 && members.every((one) => this.isGone[one] === 1);

@@ -1,11 +1,11 @@
 //! A rigid body of another program, as it moves in one step.
 
 use glam::{Quat, Vec3};
+use sim_scene::scene::ColliderBody;
 
 use sim_types::{COORDINATE_MAX, Reason};
 
 use crate::frame::Frame;
-use crate::scene::definition::collider::ColliderBody;
 
 /// Largest component of a velocity, in units per second.
 const SPEED_MAX: f32 = COORDINATE_MAX;

@@ -1,19 +1,13 @@
 //! A mesh that particles touch.
 
 use glam::Vec3;
+use sim_scene::collider_mesh::{corners, extents, sliver_height};
+use sim_scene::scene::ColliderMesh;
 
 use super::inside::{Inside, SurfacePoint};
 use super::near::NearTriangles;
 use super::tree::TriangleTree;
 use super::triangle::Triangle;
-use crate::contacts::bounds::Bounds;
-use crate::scene::definition::collider::ColliderMesh;
-
-/// Rounding of a position in the frame of a mesh, relative to the coordinates.
-pub(super) const TOLERANCE: f32 = 4.0 * f32::EPSILON;
-/// Height up to which a triangle is a sliver, in tolerances. The tolerance of its neighbours closes the
-/// gap that it leaves.
-const SLIVER: f32 = 2.0;
 
 /// The triangles of a mesh, ready for contacts. Immutable from load to load.
 #[derive(Debug, Default)]
@@ -55,28 +49,4 @@ impl CollisionMesh {
         let is_inside = |inside: &Inside| inside.contains(&self.tree, point, near, tolerance);
         self.inside.as_ref().is_some_and(is_inside)
     }
-}
-
-/// Removes the triangles that are slivers: they have no normal, or none that f32 can tell. Returns
-/// their number.
-pub(crate) fn remove_slivers(mesh: &mut ColliderMesh) -> usize {
-    let ColliderMesh { vertices, triangles, .. } = mesh;
-    let (height_min, count) = (sliver_height(vertices), triangles.len());
-    triangles.retain(|one| Triangle::new(corners(vertices, *one), height_min).is_some());
-    count - triangles.len()
-}
-
-fn corners(vertices: &[[f32; 3]], triangle: [u32; 3]) -> [[f32; 3]; 3] {
-    triangle.map(|corner| vertices[corner as usize])
-}
-
-fn extents(vertices: &[[f32; 3]]) -> Vec3 {
-    let Bounds { min, max } = Bounds::around(vertices.iter().copied());
-    let extent = |axis: usize| if -min[axis] > max[axis] { -min[axis] } else { max[axis] };
-    Vec3::new(extent(0), extent(1), extent(2))
-}
-
-/// Height over the longest edge up to which a triangle is a sliver.
-fn sliver_height(vertices: &[[f32; 3]]) -> f64 {
-    f64::from(SLIVER * TOLERANCE * extents(vertices).element_sum())
 }

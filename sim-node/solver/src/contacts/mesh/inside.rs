@@ -1,146 +1,13 @@
 //! The inside of a closed mesh.
 
 use glam::{DVec3, Vec3};
+use sim_scene::collider_mesh::{Sides, edges};
+use sim_scene::scene::ColliderMesh;
 
 use super::cells::{Cells, Place};
 use super::near::NearTriangles;
 use super::tree::{NearestTriangle, TriangleTree};
 use super::triangle::{Feature, NearestPoint};
-use crate::scene::definition::collider::ColliderMesh;
-
-/// Smallest volume of a part of a solid, relative to the sum of the volumes that each of its triangles spans.
-const VOLUME_MIN: f64 = 1e-6;
-
-/// The reason why a mesh is no solid.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum SolidFlaw {
-    /// An edge that does not join two triangles of consistent winding.
-    OpenEdge {
-        ends: [[f32; 3]; 2],
-        /// Number of triangles that list the ends in this order, and in the opposite one.
-        counts: [usize; 2],
-    },
-    /// The connected part with this vertex encloses no volume.
-    Flat([f32; 3]),
-    /// The connected part with this vertex faces inwards, and others outwards, or the other way round.
-    Reversed([f32; 3]),
-}
-
-/// Removes the triangles with two corners at the same position, which no solid needs. Returns their number.
-pub(crate) fn remove_collapsed(mesh: &mut ColliderMesh) -> usize {
-    let (places, count) = (places(&mesh.vertices), mesh.triangles.len());
-    mesh.triangles.retain(|triangle| edges(&places, *triangle).iter().all(|[from, to]| from != to));
-    count - mesh.triangles.len()
-}
-
-/// Returns the first flaw of a mesh that should enclose a solid. Vertices at the same position are one.
-pub(crate) fn find_flaw(mesh: &ColliderMesh) -> Option<SolidFlaw> {
-    let sides = Sides::new(mesh);
-    let at = |vertex: u32| mesh.vertices[vertex as usize];
-    for [from, to] in mesh.triangles.iter().flat_map(|one| edges(&sides.places, *one)) {
-        let counts = [[from, to], [to, from]].map(|edge| sides.of(edge).len());
-        if counts != [1, 1] {
-            return Some(SolidFlaw::OpenEdge { ends: [at(from), at(to)], counts });
-        }
-    }
-    let parts = sides.parts(mesh);
-    let is_flat = |part: &&Part| part.volume.abs() <= VOLUME_MIN * part.spanned;
-    if let Some(flat) = parts.iter().find(is_flat) {
-        return Some(SolidFlaw::Flat(at(flat.vertex)));
-    }
-    let is_first_outwards = parts.first().is_some_and(|part| part.volume > 0.0);
-    let reversed = parts.iter().find(|part| (part.volume > 0.0) != is_first_outwards)?;
-    Some(SolidFlaw::Reversed(at(reversed.vertex)))
-}
-
-/// Index of the first vertex at the same position, by vertex.
-fn places(vertices: &[[f32; 3]]) -> Vec<u32> {
-    // Adding 0 turns -0 into 0.
-    let place = |vertex: &[f32; 3]| vertex.map(|axis| (axis + 0.0).to_bits());
-    let mut sorted: Vec<_> = vertices.iter().map(place).zip(0_u32..).collect();
-    sorted.sort_unstable();
-    let mut places = vec![0; vertices.len()];
-    for same in sorted.chunk_by(|a, b| a.0 == b.0) {
-        for (_, vertex) in same {
-            places[*vertex as usize] = same[0].1;
-        }
-    }
-    places
-}
-
-/// The edges of a triangle, from each corner to the next, with the places of its vertices.
-fn edges(places: &[u32], triangle: [u32; 3]) -> [[u32; 2]; 3] {
-    let [a, b, c] = triangle.map(|vertex| places[vertex as usize]);
-    [[a, b], [b, c], [c, a]]
-}
-
-/// The triangles at each edge.
-struct Sides {
-    /// By vertex: the first one at the same position.
-    places: Vec<u32>,
-    /// Ends in the order of a triangle, and the triangle, ascending.
-    sorted: Vec<([u32; 2], u32)>,
-}
-
-/// Triangles that are connected through edges.
-struct Part {
-    /// One of its vertices.
-    vertex: u32,
-    /// Six times the volume that they enclose; negative if they face inwards.
-    volume: f64,
-    /// Sum of the magnitudes of its terms.
-    spanned: f64,
-}
-
-impl Sides {
-    fn new(mesh: &ColliderMesh) -> Self {
-        let places = places(&mesh.vertices);
-        let triangles = (0_u32..).zip(&mesh.triangles);
-        let mut sorted: Vec<_> = triangles
-            .flat_map(|(index, triangle)| edges(&places, *triangle).map(|edge| (edge, index)))
-            .collect();
-        sorted.sort_unstable();
-        Self { places, sorted }
-    }
-
-    /// Returns the triangles that list the ends of an edge in this order.
-    fn of(&self, edge: [u32; 2]) -> &[([u32; 2], u32)] {
-        let first = self.sorted.partition_point(|(one, _)| *one < edge);
-        let count = self.sorted[first..].iter().take_while(|(one, _)| *one == edge).count();
-        &self.sorted[first..first + count]
-    }
-
-    /// Returns the connected parts of a mesh.
-    fn parts(&self, mesh: &ColliderMesh) -> Vec<Part> {
-        let mut is_known = vec![false; mesh.triangles.len()];
-        let triangles = (0_u32..).zip(&mesh.triangles);
-        let parts = triangles.filter_map(|(index, _)| {
-            let is_new = !std::mem::replace(&mut is_known[index as usize], true);
-            is_new.then(|| self.part(mesh, index, &mut is_known))
-        });
-        parts.collect()
-    }
-
-    /// Returns the part with this triangle.
-    fn part(&self, mesh: &ColliderMesh, first: u32, is_known: &mut [bool]) -> Part {
-        let position = |vertex: u32| Vec3::from_array(mesh.vertices[vertex as usize]).as_dvec3();
-        let vertex = mesh.triangles[first as usize][0];
-        let mut part = Part { vertex, volume: 0.0, spanned: 0.0 };
-        let mut waiting = vec![first];
-        while let Some(index) = waiting.pop() {
-            let triangle = mesh.triangles[index as usize];
-            let [a, b, c] = triangle.map(|one| position(one) - position(vertex));
-            let volume = a.dot(b.cross(c));
-            part.volume += volume;
-            part.spanned += volume.abs();
-            let edges = edges(&self.places, triangle).into_iter();
-            let across = edges.flat_map(|[from, to]| self.of([to, from])).map(|(_, other)| *other);
-            let is_new = |other: &u32| !std::mem::replace(&mut is_known[*other as usize], true);
-            waiting.extend(across.filter(is_new));
-        }
-        part
-    }
-}
 
 /// Tells whether points are inside a closed mesh.
 #[derive(Debug)]
@@ -178,7 +45,7 @@ pub(super) struct SurfacePoint {
 }
 
 impl Inside {
-    /// `mesh` has no flaw ([`find_flaw`]). `order` has, by triangle of the tree, the triangle of the mesh.
+    /// `mesh` has no flaw ([`find_flaw`](sim_scene::collider_mesh::find_flaw)). `order` has, by triangle of the tree, the triangle of the mesh.
     pub(super) fn new(mesh: &ColliderMesh, order: &[u32]) -> Self {
         Self { outwards: Outwards::new(mesh, order), cells: None }
     }
@@ -284,31 +151,21 @@ impl Outwards {
 #[allow(clippy::unwrap_used, clippy::panic, reason = "a panic is how a test fails")]
 mod tests {
     //! The sign against the winding number, which needs no nearest point.
+    use sim_scene::collider_mesh::find_flaw;
+
     use super::super::near::{NearMeshes, NearQuery};
     use super::super::triangle::Triangle;
     use super::*;
     use crate::contacts::bounds::Bounds;
 
-    const CUBE: [[u32; 3]; 12] = [
-        [0, 2, 1],
-        [1, 2, 3],
-        [4, 5, 6],
-        [5, 7, 6],
-        [0, 1, 4],
-        [1, 5, 4],
-        [2, 6, 3],
-        [3, 6, 7],
-        [0, 4, 2],
-        [2, 4, 6],
-        [1, 3, 5],
-        [3, 7, 5],
-    ];
-
-    fn cube() -> ColliderMesh {
-        let corner = |bits: u32| [0, 1, 2].map(|axis| (bits >> axis & 1) as f32);
+    /// Corners on the axes, and a triangle in each octant.
+    fn octahedron() -> ColliderMesh {
+        let vertex = |index: u32| Vec3::AXES[index as usize / 2] * (1.0 - 2.0 * (index % 2) as f32);
         ColliderMesh {
-            vertices: (0..8).map(corner).collect(),
-            triangles: CUBE.into(),
+            vertices: (0..6).map(|index| vertex(index).to_array()).collect(),
+            triangles: (0..8)
+                .map(|bits| [bits & 1, 2 + (bits >> 1 & 1), 4 + (bits >> 2)])
+                .collect(),
             is_solid: true,
         }
     }
@@ -407,12 +264,12 @@ mod tests {
 
     #[test]
     fn the_first_of_equally_near_triangles_is_nearest_in_any_order() {
-        let (tree, _) = solid(&cube());
-        let all: Vec<u32> = (0..12).collect();
-        let reversed: Vec<u32> = (0..12).rev().collect();
-        // On axes and diagonals of the cube, inside and outside.
+        let (tree, _) = solid(&octahedron());
+        let all: Vec<u32> = (0..8).collect();
+        let reversed: Vec<u32> = (0..8).rev().collect();
+        // On axes and diagonals of the octahedron, inside and outside.
         for steps in 0..5 * 5 * 5 {
-            let at = [steps % 5, steps / 5 % 5, steps / 25].map(|step| step as f32 - 1.5);
+            let at = [steps % 5, steps / 5 % 5, steps / 25].map(|step| step as f32 - 2.0);
             let point = Vec3::from_array(at);
             let expected = tree.nearest(point).unwrap();
             for order in [&all, &reversed] {
@@ -443,58 +300,5 @@ mod tests {
             }
         }
         assert!(inside_count > 1000, "{inside_count}");
-    }
-
-    #[test]
-    fn meshes_that_enclose_no_solid_have_a_flaw_and_vertices_at_one_position_are_one() {
-        assert_eq!(find_flaw(&cube()), None);
-        let counts = |mesh: &ColliderMesh| match find_flaw(mesh) {
-            Some(SolidFlaw::OpenEdge { counts, .. }) => counts,
-            other => panic!("{other:?}"),
-        };
-        let without = ColliderMesh { triangles: CUBE[1..].into(), ..cube() };
-        assert_eq!(counts(&without), [1, 0]);
-        let mut turned = cube();
-        turned.triangles[5].swap(0, 1);
-        assert_eq!(counts(&turned), [2, 0]);
-        let doubled = ColliderMesh { triangles: [&CUBE[..], &CUBE[..1]].concat(), ..cube() };
-        assert_eq!(counts(&doubled), [2, 1]);
-        // Each triangle has vertices of its own.
-        let vertices = CUBE.iter().flatten().map(|vertex| cube().vertices[*vertex as usize]);
-        let triangles = (0..12).map(|index| [3 * index, 3 * index + 1, 3 * index + 2]);
-        let apart = ColliderMesh {
-            vertices: vertices.collect(),
-            triangles: triangles.collect(),
-            is_solid: true,
-        };
-        assert_eq!(find_flaw(&apart), None);
-        let flat = ColliderMesh { triangles: vec![[0, 1, 2], [0, 2, 1]], ..cube() };
-        assert_eq!(find_flaw(&flat), Some(SolidFlaw::Flat([0.0; 3])));
-    }
-
-    /// Two cubes, of which the second one may face the other way.
-    fn cubes(is_reversed: bool) -> ColliderMesh {
-        let mut cubes = cube();
-        cubes.vertices.extend(cube().vertices.iter().map(|[x, y, z]| [x + 3.0, *y, *z]));
-        cubes.triangles.extend(CUBE.iter().map(|triangle| {
-            let [a, b, c] = triangle.map(|vertex| vertex + 8);
-            if is_reversed { [b, a, c] } else { [a, b, c] }
-        }));
-        cubes
-    }
-
-    #[test]
-    fn parts_must_face_the_same_way() {
-        assert_eq!(find_flaw(&cubes(false)), None);
-        assert!(matches!(find_flaw(&cubes(true)), Some(SolidFlaw::Reversed([x, ..])) if x >= 3.0));
-    }
-
-    #[test]
-    fn collapsed_triangles_are_removed() {
-        let mut mesh = cube();
-        mesh.vertices.push([1.0, 0.0, -0.0]);
-        mesh.triangles.insert(3, [1, 8, 5]);
-        assert_eq!(remove_collapsed(&mut mesh), 1);
-        assert_eq!(mesh.triangles, CUBE);
     }
 }

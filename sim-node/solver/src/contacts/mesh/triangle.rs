@@ -1,6 +1,7 @@
 //! Contact of a path with one triangle.
 
 use glam::{DVec3, Vec3};
+use sim_scene::collider_mesh;
 
 use crate::contacts::bounds::{Bounds, lesser};
 
@@ -92,17 +93,9 @@ impl Triangle {
     /// Creates a triangle, or `None` for a sliver: one whose height over its longest edge is at most
     /// `height_min`.
     pub(super) fn new(corners: [[f32; 3]; 3], height_min: f64) -> Option<Self> {
+        let normal = collider_mesh::normal(corners, height_min)?;
         let corner = corners.map(|corner| Vec3::from_array(corner).as_dvec3());
         let edges = [corner[1] - corner[0], corner[2] - corner[1], corner[0] - corner[2]];
-        let cross = edges[0].cross(edges[1]);
-        let area = cross.dot(cross).sqrt();
-        let longest = edges.iter().map(|edge| edge.dot(*edge)).fold(0.0, f64::max).sqrt();
-        // NaN compares false: a triangle without an extent has no height.
-        let has_height = area > height_min * longest;
-        if !has_height {
-            return None;
-        }
-        let normal = cross * (1.0 / area);
         let inwards = edges.map(|edge| unit(normal.cross(edge)));
         Some(Self {
             corners: corners.map(Vec3::from_array),

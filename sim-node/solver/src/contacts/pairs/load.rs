@@ -1,10 +1,11 @@
 //! Pairs of particles that are near each other at load, and so have another contact distance, or none.
 
+use sim_scene::model::Model;
+
 use super::box_tree::Search;
 use super::tile::{TILE, TILE_LENGTH};
 use super::tile_tree::{Query, TileTree};
 use crate::kernels::Kernels;
-use crate::scene::model::Model;
 
 /// Particles of one connected body never touch if they are nearer than this at load, in contact
 /// distances: a fold of two layers is a half circle of pi / 2 = 1.57.

@@ -3,6 +3,8 @@
 //! Sixteen particles that are neighbours at load form a tile. The tree above the tiles keeps its form from load
 //! to load: only the boxes follow the particles.
 
+use sim_scene::model::Model;
+
 use super::box_tree::{BoxTree, NodePair, PairSearch, Search, SearchRoots, Within, pair_order};
 use super::gathered::{Gathered, NO_SCRATCHES, Room};
 use super::pair_batch::PairBatch;
@@ -11,7 +13,6 @@ use crate::contacts::bounds::Bounds;
 use crate::kernels::Kernels;
 use crate::kernels::lanes::{LaneWork, PackedParticle, Wide, axes};
 use crate::kernels::vectors::dot;
-use crate::scene::model::Model;
 use crate::store::workers::Workers;
 
 /// The tiles and the boxes above them.

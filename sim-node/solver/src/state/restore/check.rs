@@ -1,11 +1,12 @@
 //! Checks that a snapshot and a keyframe are a state of a scene. Both come from outside.
 
+use sim_scene::checks::is_near;
+use sim_scene::rotation::Pose;
 use sim_types::{OVER_S_MAX, ParticleFlags};
 
 use super::{RestoreError, is_held};
-use crate::checks::is_near;
 use crate::constraints::tethers::{TetherBasis, is_root};
-use crate::frame::{Frame, Pose};
+use crate::frame::Frame;
 use crate::motion::{MOTION_POINTS_MAX, MotionState, steps_at};
 use crate::solver::Solver;
 use crate::state::keyframe::{Keyframe, Motions, Moved};

@@ -2,8 +2,9 @@
 
 use std::collections::HashMap;
 
+use sim_scene::model::Model;
+
 use crate::constraints::order::ProjectionOrder;
-use crate::scene::model::Model;
 use crate::store::graph::find_particle;
 
 /// Fewest equal figures that are worth a crowd: fewer would leave lanes empty.
@@ -150,10 +151,10 @@ impl Roots {
 #[cfg(test)]
 mod tests {
     //! Figures that form a crowd, and others.
+    use sim_scene::scene::{ConstraintOrder, Scene};
+
     use super::*;
     use crate::constraints::order::ProjectionOrders;
-    use crate::scene::Scene;
-    use crate::scene::definition::settings::ConstraintOrder;
 
     /// Returns the figures of a scene with the numbers of their particles and their count.
     fn found(text: &str) -> Vec<(usize, usize)> {

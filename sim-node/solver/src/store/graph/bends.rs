@@ -1,9 +1,11 @@
 //! The bends of the graph, in lane groups of eight that share no particle.
 
+use sim_scene::constraints::bends::BendShape;
+use sim_scene::model::Model;
+
 use super::forces::MovedParticles;
 use super::group::{ConstraintGroup, part_count};
 use super::indices::find_particle;
-use crate::constraints::bends::BendShape;
 use crate::constraints::bends::projection::{
     Arm, BendPass, BendProjection, HingeRest, bend_value, bend_weight, subtract_rest,
 };
@@ -13,7 +15,6 @@ use crate::kernels::Kernels;
 use crate::kernels::huge_pages::refill;
 use crate::kernels::lanes::{LaneWork, Lanes8, PackedParticle, Wide, axes, map_axes};
 use crate::kernels::worker_pool::SharedSlice;
-use crate::scene::model::Model;
 use crate::store::layout::Location;
 use crate::store::workers::{WorkerScratch, Workers};
 

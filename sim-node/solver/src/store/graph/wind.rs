@@ -1,9 +1,10 @@
 //! The wind on the triangles of the graph.
 
+use sim_scene::model::Model;
+
 use super::indices::find_particle;
 use crate::kernels::lanes::{LaneWork, Lanes8, PackedParticle, Wide};
 use crate::kernels::vectors::{lane_of, set_lane, store, sum};
-use crate::scene::model::Model;
 use crate::step::wind::{Corner, WindStep};
 
 /// The triangles between particles of the graph, in the order of the scene.

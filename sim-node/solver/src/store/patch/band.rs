@@ -8,13 +8,14 @@
 
 use std::ops::Range;
 
+use sim_scene::constraints::families::Family;
+
 use super::band_forces::{BandForces, LentForces};
 use super::bends::project_bends;
 use super::sheet_layout::{FamilyBlock, SheetLayout};
 use super::span::Span;
 use crate::constraints::bends::projection::BendPass;
 use crate::constraints::columns::{ConstraintColumns, FullPass};
-use crate::constraints::families::Family;
 use crate::constraints::fields::Pass;
 use crate::constraints::projection::Projection;
 use crate::constraints::projection_block::ProjectionBlock;

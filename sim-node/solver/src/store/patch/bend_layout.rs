@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::constraints::bends::families::BendFamily;
+use sim_scene::constraints::bends::families::BendFamily;
 
 /// The bends that begin in a row, family by family: their scaled compliances, and, if they are in memory,
 /// the three components of their multipliers.

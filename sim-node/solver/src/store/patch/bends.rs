@@ -1,13 +1,14 @@
 //! The projection of the bends of a sheet.
 
+use sim_scene::constraints::bends::families::BendFamily;
+use sim_scene::constraints::bends::{SECOND_DIFFERENCE, TWIST};
+
 use super::bend_layout::BendGroup;
 use super::sheet_layout::SheetLayout;
 use crate::constraints::bends::block::{BEND_BLOCK_LENGTH, BendBlock};
-use crate::constraints::bends::families::BendFamily;
 use crate::constraints::bends::projection::{
     Arm, BendPass, BendProjection, bend_value, bend_weight,
 };
-use crate::constraints::bends::{SECOND_DIFFERENCE, TWIST};
 use crate::constraints::projection::LaneIndex;
 use crate::kernels::lanes::{Lanes8, Wide, axes, lane_groups, lane_groups_mut, map_axes};
 use crate::store::rows::ends::{ColumnUnit, Ends, pairs, pairs_mut, unzip, zip};

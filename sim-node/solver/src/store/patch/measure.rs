@@ -1,7 +1,8 @@
 //! The measurement of forces in a sheet.
 
+use sim_scene::constraints::families::Family;
+
 use super::Patch;
-use crate::constraints::families::Family;
 use crate::store::pulls::{Pull, Pulls};
 use crate::store::rows::RowForces;
 

@@ -1,8 +1,9 @@
 //! The place of constraints and bends in the rows of a sheet.
 
+use sim_scene::constraints::bends::families::BendFamily;
+use sim_scene::constraints::families::{Family, Sheet};
+
 use super::bend_layout::{BendGroup, BendLayout};
-use crate::constraints::bends::families::BendFamily;
-use crate::constraints::families::{Family, Sheet};
 use crate::constraints::parameters::PassSoftness;
 use crate::store::layout::Layout;
 use crate::store::rows::{LINE_LENGTH, RowLayout};

@@ -1,9 +1,10 @@
 //! The sheets that are stored in rows, and the particles in them.
 
+use sim_scene::constraints::bends::families::BendFamily;
+use sim_scene::constraints::families::{Family, Sheet};
+use sim_scene::model::Model;
+
 use super::SheetFamilies;
-use crate::constraints::bends::families::BendFamily;
-use crate::constraints::families::{Family, Sheet};
-use crate::scene::model::Model;
 
 /// A particle in a sheet.
 pub(crate) struct Found {

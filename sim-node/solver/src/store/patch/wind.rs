@@ -4,7 +4,8 @@
 //! right. The wind on eight cells is computed at once. Then eight particles sum it, each over its six
 //! triangles in their order in the scene. Missing triangles at the border add 0, and so do triangles with a torn side.
 
-use crate::constraints::sides::TornSides;
+use sim_scene::constraints::sides::TornSides;
+
 use crate::kernels::huge_pages::refill;
 use crate::kernels::lanes::{LaneWork, Lanes8, Wide, axes, lane_groups, lane_groups_mut};
 use crate::kernels::vectors::sum;

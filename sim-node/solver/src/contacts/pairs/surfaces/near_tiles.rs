@@ -92,12 +92,13 @@ impl NearTiles {
 
 #[cfg(test)]
 mod tests {
+    use sim_scene::model::Model;
+
     use super::super::super::tile::TILE;
     use super::super::samples::{sheet, surface_of};
     use super::*;
     use crate::kernels::Kernels;
     use crate::kernels::lanes::LaneWork;
-    use crate::scene::model::Model;
 
     /// Counts the triangles of a tile that are within 100 m.
     struct Count<'a>(&'a mut NearTiles, (u32, &'a [[u32; 3]]), &'a [PackedParticle]);

@@ -1,9 +1,10 @@
 //! Sheets and numbers for the tests of surfaces.
 
+use sim_scene::model::Model;
+use sim_scene::scene::Scene;
+
 use super::super::load;
 use super::surface::Surface;
-use crate::scene::Scene;
-use crate::scene::model::Model;
 
 /// Pseudo-random numbers.
 pub(super) struct Random(pub(super) u32);

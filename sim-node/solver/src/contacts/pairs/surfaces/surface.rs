@@ -1,12 +1,12 @@
 //! The triangles that particles touch, and what they share.
 
 use glam::Vec3;
+use sim_scene::constraints::sides::TornSides;
+use sim_scene::model::Model;
 
 use super::super::load::LoadPairs;
 use super::nearest::{Feature, Nearest, SIDE_TOLERANCE, is_on_side_of, next};
-use crate::constraints::sides::TornSides;
 use crate::kernels::lanes::PackedParticle;
-use crate::scene::model::Model;
 
 /// Largest number of edges that a contact crosses in a substep. A particle that crosses more has left the contact
 /// anyway.
