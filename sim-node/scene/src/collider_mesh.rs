@@ -12,7 +12,7 @@ const SLIVER: f32 = 2.0;
 
 /// Removes the triangles that are slivers: they have no normal, or none that f32 can tell. Returns
 /// their number.
-pub fn remove_slivers(mesh: &mut ColliderMesh) -> usize {
+pub(crate) fn remove_slivers(mesh: &mut ColliderMesh) -> usize {
     let ColliderMesh { vertices, triangles, .. } = mesh;
     let (height_min, count) = (sliver_height(vertices), triangles.len());
     triangles.retain(|one| normal(corners(vertices, *one), height_min).is_some());
@@ -49,7 +49,7 @@ pub fn sliver_height(vertices: &[[f32; 3]]) -> f64 {
     f64::from(SLIVER * TOLERANCE * extents(vertices).element_sum())
 }
 
-/// Smallest volume of a part of a solid, relative to the sum of the volumes that each of its triangles spans.
+/// Smallest volume of a component of a solid, relative to the sum of the volumes that each of its triangles spans.
 const VOLUME_MIN: f64 = 1e-6;
 
 /// The reason why a mesh is no solid.
@@ -62,14 +62,14 @@ pub enum SolidFlaw {
         /// Number of triangles that list the ends in this order, and in the opposite one.
         counts: [usize; 2],
     },
-    /// The connected part with this vertex encloses no volume.
+    /// The component with this vertex encloses no volume.
     Flat([f32; 3]),
-    /// The connected part with this vertex faces inwards, and others outwards, or the other way round.
+    /// The component with this vertex faces inwards, and others outwards, or the other way round.
     Reversed([f32; 3]),
 }
 
 /// Removes the triangles with two corners at the same position, which no solid needs. Returns their number.
-pub fn remove_collapsed(mesh: &mut ColliderMesh) -> usize {
+pub(crate) fn remove_collapsed(mesh: &mut ColliderMesh) -> usize {
     let (places, count) = (places(&mesh.vertices), mesh.triangles.len());
     mesh.triangles.retain(|triangle| edges(&places, *triangle).iter().all(|[from, to]| from != to));
     count - mesh.triangles.len()
@@ -85,13 +85,13 @@ pub fn find_flaw(mesh: &ColliderMesh) -> Option<SolidFlaw> {
             return Some(SolidFlaw::OpenEdge { ends: [at(from), at(to)], counts });
         }
     }
-    let parts = sides.parts(mesh);
-    let is_flat = |part: &&Part| part.volume.abs() <= VOLUME_MIN * part.spanned;
-    if let Some(flat) = parts.iter().find(is_flat) {
+    let components = sides.components(mesh);
+    let is_flat = |one: &&Component| one.volume.abs() <= VOLUME_MIN * one.spanned;
+    if let Some(flat) = components.iter().find(is_flat) {
         return Some(SolidFlaw::Flat(at(flat.vertex)));
     }
-    let is_first_outwards = parts.first().is_some_and(|part| part.volume > 0.0);
-    let reversed = parts.iter().find(|part| (part.volume > 0.0) != is_first_outwards)?;
+    let is_first_outwards = components.first().is_some_and(|one| one.volume > 0.0);
+    let reversed = components.iter().find(|one| (one.volume > 0.0) != is_first_outwards)?;
     Some(SolidFlaw::Reversed(at(reversed.vertex)))
 }
 
@@ -125,15 +125,15 @@ pub struct Sides {
     sorted: Vec<([u32; 2], u32)>,
 }
 
-/// Triangles that are connected through edges.
+/// Triangles that are connected through edges: a connected component of a mesh.
 #[derive(Debug)]
-pub struct Part {
+pub struct Component {
     /// One of its vertices.
-    pub vertex: u32,
+    vertex: u32,
     /// Six times the volume that they enclose; negative if they face inwards.
     pub volume: f64,
     /// Sum of the magnitudes of its terms.
-    pub spanned: f64,
+    spanned: f64,
 }
 
 impl Sides {
@@ -155,35 +155,35 @@ impl Sides {
         &self.sorted[first..first + count]
     }
 
-    /// Returns the connected parts of a mesh.
-    pub fn parts(&self, mesh: &ColliderMesh) -> Vec<Part> {
+    /// Returns the connected components of a mesh.
+    pub fn components(&self, mesh: &ColliderMesh) -> Vec<Component> {
         let mut is_known = vec![false; mesh.triangles.len()];
         let triangles = (0_u32..).zip(&mesh.triangles);
-        let parts = triangles.filter_map(|(index, _)| {
+        let components = triangles.filter_map(|(index, _)| {
             let is_new = !std::mem::replace(&mut is_known[index as usize], true);
-            is_new.then(|| self.part(mesh, index, &mut is_known))
+            is_new.then(|| self.component(mesh, index, &mut is_known))
         });
-        parts.collect()
+        components.collect()
     }
 
-    /// Returns the part with this triangle.
-    fn part(&self, mesh: &ColliderMesh, first: u32, is_known: &mut [bool]) -> Part {
+    /// Returns the component with this triangle.
+    fn component(&self, mesh: &ColliderMesh, first: u32, is_known: &mut [bool]) -> Component {
         let position = |vertex: u32| Vec3::from_array(mesh.vertices[vertex as usize]).as_dvec3();
         let vertex = mesh.triangles[first as usize][0];
-        let mut part = Part { vertex, volume: 0.0, spanned: 0.0 };
+        let mut component = Component { vertex, volume: 0.0, spanned: 0.0 };
         let mut waiting = vec![first];
         while let Some(index) = waiting.pop() {
             let triangle = mesh.triangles[index as usize];
             let [a, b, c] = triangle.map(|one| position(one) - position(vertex));
             let volume = a.dot(b.cross(c));
-            part.volume += volume;
-            part.spanned += volume.abs();
+            component.volume += volume;
+            component.spanned += volume.abs();
             let edges = edges(&self.places, triangle).into_iter();
             let across = edges.flat_map(|[from, to]| self.of([to, from])).map(|(_, other)| *other);
             let is_new = |other: &u32| !std::mem::replace(&mut is_known[*other as usize], true);
             waiting.extend(across.filter(is_new));
         }
-        part
+        component
     }
 }
 

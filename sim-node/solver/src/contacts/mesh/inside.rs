@@ -117,7 +117,7 @@ impl Outwards {
             corners: edges(*triangle).map(|[corner, _]| at_corners[corner as usize].as_vec3()),
         });
         let normals = normals.collect();
-        let is_outwards = sides.parts(mesh).first().is_some_and(|part| part.volume > 0.0);
+        let is_outwards = sides.components(mesh).first().is_some_and(|part| part.volume > 0.0);
         Self { facing: if is_outwards { 1.0 } else { -1.0 }, normals }
     }
 
