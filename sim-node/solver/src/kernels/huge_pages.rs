@@ -3,6 +3,7 @@
 use std::mem::MaybeUninit;
 
 /// Bytes of a huge page. An allocation below twice this size may contain no aligned one.
+#[cfg(target_os = "linux")]
 const HUGE_PAGE_SIZE_BYTES: usize = 2 << 20;
 
 /// Resizes an array to `count` elements, all equal to `value`, in huge pages where possible.
