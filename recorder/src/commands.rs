@@ -1,4 +1,4 @@
-//! The subcommands, one file each.
+//! The subcommands, one file each; `recorder state` is a form of `recorder record`.
 
 pub(crate) mod check;
 pub(crate) mod diff;
@@ -10,5 +10,4 @@ pub(crate) mod repair;
 pub(crate) mod restore;
 pub(crate) mod scene;
 pub(crate) mod simulate;
-pub(crate) mod state;
 pub(crate) mod verify;

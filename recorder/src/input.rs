@@ -140,27 +140,13 @@ pub(crate) fn read_text_file(path: &Path, size_bytes_max: u64) -> io::Result<Str
 mod command_source_tests {
     use std::fs;
 
-    use recording::{Closing, LogOptions, LogWriter, RunDescription, Up};
+    use recording::{Closing, LogOptions, LogWriter, RunDescription};
     use sim_contract::Action;
 
     use super::*;
 
     fn recording(path: &Path, outcome_count: u64, command_steps: &[u64]) -> CommandSource {
-        let description = RunDescription {
-            run_id: 1,
-            epoch_ns: 0,
-            scene_name: "point".to_owned(),
-            origin: [0.0; 3],
-            up: Up::Y,
-            rate_hz: 240,
-            method: 0,
-            particle_count: 0,
-            constraint_count: 0,
-            bend_count: 0,
-            solver_version: 1,
-            contract_version: 1,
-            recorder_version: "0.1.0".to_owned(),
-        };
+        let description = RunDescription { rate_hz: 240, ..RunDescription::default() };
         let mut log =
             LogWriter::create(Vec::new(), LogOptions::default(), &description, b"", 0).unwrap();
         let row = StepRow { step: 120, outcome_count, ..StepRow::default() };

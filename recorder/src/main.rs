@@ -11,9 +11,7 @@ use clap::{CommandFactory, Parser, Subcommand};
 use sim_cli::DocumentVerb;
 
 use cli::output::{self, Exit};
-use commands::{
-    check, diff, export, info, play, record, repair, restore, scene, simulate, state, verify,
-};
+use commands::{check, diff, export, info, play, record, repair, restore, scene, simulate, verify};
 
 /// Record a simulation, play it back, and prove that it can be re-simulated bit for bit
 #[derive(Debug, Parser)]
@@ -63,7 +61,7 @@ enum Command {
     /// Simulate a scene in this process, as fast as possible, and record it like a live run
     Simulate(simulate::SimulateArgs),
     /// Record one step of a running node: its complete state
-    State(state::StateArgs),
+    State(record::StateArgs),
     /// Re-simulate a recording and compare every bit
     Verify(verify::VerifyArgs),
     #[command(flatten)]
@@ -91,7 +89,7 @@ fn run(command: &Command) -> anyhow::Result<Exit> {
         Command::Restore(args) => restore::run(args),
         Command::Scene(args) => scene::run(args),
         Command::Simulate(args) => simulate::run(args),
-        Command::State(args) => state::run(args),
+        Command::State(args) => record::run(&args.clone().into()),
         Command::Verify(args) => verify::run(args),
         Command::Document(document) => document.run(Args::command()).map(|()| Exit::Done),
     }

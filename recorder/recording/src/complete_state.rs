@@ -1,6 +1,7 @@
 //! Complete states of a recording: found in it, or simulated from the last keyframe before the step.
 
 use std::io::Read;
+use std::ops::RangeInclusive;
 
 use sim_messages::{ParticleState, StopFlag, scene_hash};
 
@@ -102,7 +103,7 @@ pub fn state_at_place<R: Read>(
     threads: usize,
     stop: &StopFlag,
 ) -> Result<CompleteState, CompleteStateError> {
-    let StatePlace { step, keyframe_step } = place;
+    let StatePlace { step, keyframe_step, .. } = place;
     let mut first = None;
     let mut frames = FrameReader::new(log);
     while first.as_ref().is_none_or(|frame: &Frame| frame.row.step < keyframe_step) {
@@ -197,12 +198,14 @@ pub enum Wanted {
 }
 
 /// The steps of a state and of the keyframe to start from.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct StatePlace {
     /// The step of the state.
     pub step: u64,
     /// The last step up to it with a keyframe.
     pub keyframe_step: u64,
+    /// The end of the file, if it was reached.
+    pub end: Option<LogEnd>,
 }
 
 /// The reason why a state is not found.
@@ -216,8 +219,10 @@ pub enum FindStateError {
     Missing {
         /// The content that it lacks.
         problem: String,
-        /// The end of the file, if it was reached.
+        /// The end of the file, if it explains the lack.
         end: Option<LogEnd>,
+        /// The steps from the first complete state to the last snapshot, if there is a complete state.
+        steps: Option<RangeInclusive<u64>>,
     },
 }
 
@@ -230,25 +235,36 @@ pub fn find_state<R: Read>(
     wanted: Wanted,
 ) -> Result<StatePlace, FindStateError> {
     let mut frames = FrameReader::new(log);
-    let (mut found, mut keyframe_step) = (None, None);
+    let (mut keyframe_step, mut steps) = (None, None);
     // The nearest snapshots before and after the wanted step.
     let (mut before, mut behind) = (None, None);
     while let Some(frame) = frames.next_frame()? {
-        let step = frame.row.step;
+        let (step, is_complete) = (frame.row.step, frame.is_complete_state());
+        if is_complete || steps.is_some() {
+            let first = steps.as_ref().map_or(step, |steps: &RangeInclusive<u64>| *steps.start());
+            steps = Some(first..=step);
+        }
         let is_later = match wanted {
             Wanted::Last => false,
             Wanted::Step(wanted) | Wanted::UpTo(wanted) => step > wanted,
         };
         if is_later {
-            behind = Some(step);
-            break;
+            behind.get_or_insert(step);
+            // Without a state, the error names all steps that the file has.
+            if keyframe_step.is_some() {
+                break;
+            }
+            continue;
         }
         before = Some(step);
-        if frame.is_complete_state() {
+        if is_complete {
             keyframe_step = Some(step);
         }
-        found = keyframe_step.map(|keyframe_step| StatePlace { step, keyframe_step });
     }
+    let end = frames.end().cloned();
+    let found = keyframe_step.zip(before);
+    let found =
+        found.map(|(keyframe_step, step)| StatePlace { step, keyframe_step, end: end.clone() });
     let found = found.filter(|place| match wanted {
         Wanted::Step(wanted) => place.step == wanted,
         Wanted::Last | Wanted::UpTo(_) => true,
@@ -268,5 +284,6 @@ pub fn find_state<R: Read>(
         };
         format!("has no complete state of step {step}: {reason}")
     };
-    found.ok_or_else(|| FindStateError::Missing { problem: problem(), end: frames.end().cloned() })
+    let end = end.filter(|_| behind.is_none());
+    found.ok_or_else(|| FindStateError::Missing { problem: problem(), end, steps })
 }

@@ -11,8 +11,8 @@ use sim_messages::LoadHeader;
 use sim_solver::{Scene, Solver};
 
 use crate::log::{
-    FileSource, LoadRows, LogReader, ReadError, RepairError, RepairReport, SCENE_ATTACHMENT,
-    SurfaceRow, Topic, TopologyRow, open_recording, repair_file,
+    Cure, FileSource, Finding, LoadRows, LogReader, ReadError, RepairError, RepairReport,
+    SCENE_ATTACHMENT, SurfaceRow, Topic, TopologyRow, open_recording, repair_file,
 };
 
 /// Bytes that a repair writes at a time.
@@ -47,6 +47,14 @@ impl IntactParts {
     /// Returns the step of the last intact snapshot.
     pub fn last_step(&self) -> Option<u64> {
         self.report.steps.map(|[_, last]| last)
+    }
+
+    /// Returns what the recording has lost, and where, as lines for people.
+    pub fn losses(&self) -> Vec<String> {
+        let is_loss = |finding: &&Finding| finding.cure != Cure::Rewrite;
+        let damage = self.report.findings.list().iter().filter(is_loss).map(ToString::to_string);
+        let missing = self.report.losses.lines();
+        damage.chain(missing.into_iter().map(|what| format!("missing: {what}"))).collect()
     }
 
     /// Returns the bytes of the repaired recording. It declares what is missing.

@@ -15,6 +15,7 @@ mod rows;
 mod run;
 mod scanner;
 mod source;
+mod state;
 mod tape;
 mod tears;
 mod topic;
@@ -51,8 +52,9 @@ pub use rows::{
 pub use run::selection::ContentSelection;
 pub use run::{CLOSING_METADATA, Closing, FORMAT_VERSION, RunDescription, SCENE_ATTACHMENT};
 pub use source::{FileSource, ReadAt};
-pub use tape::{Tape, TapeError, TapeState};
-pub use tears::{TearTracker, state_hash, torn_before_first};
+pub use state::RecordedState;
+pub use tape::{Tape, TapeError};
+pub use tears::{HashSeeds, state_hash};
 pub use topic::{AllCounts, Topic, TopicCounts};
 #[cfg(feature = "files")]
 pub(crate) use writer::replace_run_id;

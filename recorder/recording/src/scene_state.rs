@@ -1,18 +1,17 @@
 //! The scene of a recording, and its state at a snapshot with everything that pictures and meshes show.
 
 use std::io::Read;
+use std::ops::{Deref, DerefMut};
 use std::str::Utf8Error;
 use std::sync::Arc;
 
-use sim_messages::{
-    ColliderState, ConstraintState, ParameterValues, ParticleState, Torn, Triangle,
-};
+use sim_messages::{ConstraintState, TornConstraint, Triangle};
 use sim_solver::scene::{ColliderMesh, ColliderMeshes, SceneError};
 use sim_solver::{EnergyMeter, SOLVER_VERSION, Scene, Solver, TornSides};
 
 use super::log::{
-    ColliderRow, CollidersRow, EnergyRow, ForcesRow, Frame, FrameReader, LogReader, Message,
-    OutcomeRow, ReadError, ShapeRow, StepRow, Tape, TapeError, TearTracker, constraint_state,
+    EnergyRow, Frame, FrameReader, LogReader, Message, OutcomeRow, ReadError, RecordedState,
+    ShapeRow, Tape, TapeError, constraint_state,
 };
 use super::simulation::{colliders_row, forces_row, step_row};
 
@@ -51,13 +50,11 @@ pub enum SceneStateError {
     },
 }
 
-/// The state at one snapshot.
+/// The state at one snapshot, with the constraints and triangles of the load.
 #[derive(Debug, Clone, Default)]
 pub struct SceneState {
-    /// The row of its step.
-    pub row: StepRow,
-    /// The particles.
-    pub particles: Vec<ParticleState>,
+    /// The state, which this dereferences to.
+    pub recorded: RecordedState,
     /// The constraints as loaded.
     pub constraints: Vec<ConstraintState>,
     /// By constraint index: torn at or before the step.
@@ -66,16 +63,24 @@ pub struct SceneState {
     pub triangles: Vec<Triangle>,
     /// The torn sides of the triangles. `None` if no constraint has torn yet.
     pub sides: Option<TornSides>,
-    /// The colliders, in their poses after the step.
-    pub colliders: Vec<ColliderRow>,
     /// The triangles of the colliders that are meshes. `None` if no collider is a mesh.
     pub collider_meshes: Option<Arc<ColliderMeshes>>,
     /// The outcomes of commands since the last state that [`SceneStates`] has returned.
     pub outcomes: Vec<OutcomeRow>,
-    /// The forces of the step, if the recording has them.
-    pub forces: Option<ForcesRow>,
-    /// The parameters of the step, if the recording has them.
-    pub parameters: Option<ParameterValues>,
+}
+
+impl Deref for SceneState {
+    type Target = RecordedState;
+
+    fn deref(&self) -> &RecordedState {
+        &self.recorded
+    }
+}
+
+impl DerefMut for SceneState {
+    fn deref_mut(&mut self) -> &mut RecordedState {
+        &mut self.recorded
+    }
 }
 
 /// The states of a recording, in their order. One of them is in memory.
@@ -83,7 +88,6 @@ pub struct SceneState {
 pub struct SceneStates<R> {
     frames: FrameReader<R>,
     state: SceneState,
-    tears: TearTracker,
     /// A state was returned.
     has_begun: bool,
 }
@@ -91,8 +95,7 @@ pub struct SceneStates<R> {
 impl<R: Read> SceneStates<R> {
     /// Begins at the start of a recording.
     pub fn new(log: LogReader<R>) -> Self {
-        let (frames, tears) = (FrameReader::new(log), TearTracker::new(Torn::default()));
-        Self { frames, state: SceneState::default(), tears, has_begun: false }
+        Self { frames: FrameReader::new(log), state: SceneState::default(), has_begun: false }
     }
 
     /// Returns the state at the next recorded step from `step` on, or `None` at the end of the readable part. The first
@@ -101,11 +104,11 @@ impl<R: Read> SceneStates<R> {
     /// # Errors
     /// If the file cannot be read, or its messages contradict each other.
     pub fn next_from(&mut self, step: u64) -> Result<Option<&SceneState>, SceneStateError> {
-        let Self { frames, state, tears, has_begun } = self;
+        let Self { frames, state, has_begun } = self;
         state.outcomes.clear();
         loop {
             let Some(frame) = frames.next_frame()? else { return Ok(None) };
-            state.apply_frame(frame, tears)?;
+            state.apply_frame(frame)?;
             state.read_meshes(frames.log());
             if !*has_begun {
                 state.outcomes.retain(|row| row.step >= step);
@@ -115,7 +118,7 @@ impl<R: Read> SceneStates<R> {
             }
         }
         *has_begun = true;
-        state.set_torn(tears.torn().iter().flat_map(|torn| torn.indices()))?;
+        state.update_torn()?;
         state.check_indices()?;
         Ok(Some(state))
     }
@@ -131,17 +134,13 @@ impl SceneState {
         step: u64,
         scene: Option<&Scene>,
     ) -> Result<Self, SceneStateError> {
-        let found = tape.state_at(step)?;
-        let constraints = tape.topology().constraints().ok_or(SceneStateError::Topology)?;
         let mut state = Self {
-            row: found.row,
-            particles: found.particles.to_vec(),
-            constraints,
+            recorded: tape.state_at(step)?,
+            constraints: tape.topology().constraints().ok_or(SceneStateError::Topology)?,
             triangles: tape.surface().triangles().ok_or(SceneStateError::Surface)?,
-            colliders: found.colliders.map_or_else(Vec::new, |row| row.colliders),
             ..Self::default()
         };
-        state.set_torn(found.torn.indices())?;
+        state.update_torn()?;
         if state.has_meshes() {
             state.collider_meshes = scene.map(|scene| Arc::new(scene.collider_meshes()));
         }
@@ -154,56 +153,46 @@ impl SceneState {
         let constraints: Vec<_> = solver.constraints().map(constraint_state).collect();
         let triangles = solver.triangles().iter();
         let mut state = Self {
-            row: step_row(solver, step),
-            particles: bytemuck::cast_slice(solver.particles()).to_vec(),
+            recorded: RecordedState {
+                row: step_row(solver, step),
+                particles: Arc::new(bytemuck::cast_slice(solver.particles()).to_vec()),
+                torn: solver.torn().iter().map(|index| TornConstraint::new(*index, None)).collect(),
+                colliders: Some(colliders_row(solver, step)),
+                forces: forces_row(solver, step),
+                ..RecordedState::default()
+            },
             constraints,
             triangles: triangles.map(|corners| Triangle { corners: *corners }).collect(),
-            colliders: colliders_row(solver, step).colliders,
-            forces: forces_row(solver, step),
             ..Self::default()
         };
         // A solver tears only constraints that it has.
-        let _is_torn = state.set_torn(solver.torn().iter().copied());
+        let _is_torn = state.update_torn();
         if state.has_meshes() {
             state.collider_meshes = Some(Arc::new(scene.collider_meshes()));
         }
         state
     }
 
-    fn apply_frame(
-        &mut self,
-        frame: Frame,
-        tears: &mut TearTracker,
-    ) -> Result<(), SceneStateError> {
+    fn apply_frame(&mut self, frame: Frame) -> Result<(), SceneStateError> {
         self.forces = None;
-        for message in &frame.updates {
-            if let Message::Topology(row) = message {
-                *tears = TearTracker::new(row.torn_before());
+        for message in frame.updates {
+            self.recorded.apply(&message);
+            match message {
+                Message::Topology(row) => {
+                    self.torn = row.torn_before();
+                    self.constraints = row.constraints().ok_or(SceneStateError::Topology)?;
+                    self.sides = None;
+                }
+                Message::Surface(row) => {
+                    self.triangles = row.triangles().ok_or(SceneStateError::Surface)?;
+                    self.sides = None;
+                }
+                Message::Outcome(row) => self.outcomes.push(row),
+                _ => {}
             }
-            tears.process(message);
-            self.apply_message(message)?;
         }
-        self.row = frame.row;
-        self.particles = frame.particles.unwrap_or_default();
-        Ok(())
-    }
-
-    fn apply_message(&mut self, message: &Message) -> Result<(), SceneStateError> {
-        match message {
-            Message::Topology(row) => {
-                self.constraints = row.constraints().ok_or(SceneStateError::Topology)?;
-                self.sides = None;
-            }
-            Message::Surface(row) => {
-                self.triangles = row.triangles().ok_or(SceneStateError::Surface)?;
-                self.sides = None;
-            }
-            Message::Colliders(row) => self.colliders.clone_from(&row.colliders),
-            Message::Outcome(row) => self.outcomes.push(row.clone()),
-            Message::Forces(row) => self.forces = Some(row.clone()),
-            Message::Parameters(row) => self.parameters = Some(row.values.clone()),
-            _ => {}
-        }
+        self.recorded.apply(&Message::Step(frame.row));
+        self.particles = Arc::new(frame.particles.unwrap_or_default());
         Ok(())
     }
 
@@ -217,15 +206,15 @@ impl SceneState {
     }
 
     fn has_meshes(&self) -> bool {
-        self.colliders.iter().any(|one| matches!(one.shape, ShapeRow::Mesh { .. }))
+        self.colliders().iter().any(|one| matches!(one.shape, ShapeRow::Mesh { .. }))
     }
 
     /// Returns the recorded energy of the state, or measures the energy. `None` if the parameters were not recorded, or
     /// the state is not a state of the scene.
     pub fn energy(&self, meter: &mut EnergyMeter) -> Option<EnergyRow> {
         self.row.energy.or_else(|| {
-            let particles = bytemuck::cast_slice(&self.particles);
-            let parameters = self.parameters.as_ref()?;
+            let particles = bytemuck::cast_slice(self.particles.as_slice());
+            let parameters = &self.parameters.as_ref()?.values;
             meter.measure(particles, self.torn_constraints(), parameters).map(EnergyRow::from)
         })
     }
@@ -235,14 +224,14 @@ impl SceneState {
         self.collider_meshes.as_ref()?.get(&collider)
     }
 
-    /// Replaces the torn constraints.
+    /// Takes the torn constraints and triangles from the recorded state.
     ///
     /// # Errors
     /// If a torn constraint is not in the topology. The error names the first one.
-    pub fn set_torn(&mut self, torn: impl Iterator<Item = u32>) -> Result<(), SceneStateError> {
+    pub fn update_torn(&mut self) -> Result<(), SceneStateError> {
         self.is_torn.clear();
         self.is_torn.resize(self.constraints.len(), false);
-        for constraint in torn {
+        for constraint in self.recorded.torn.indices() {
             let is_torn = self.is_torn.get_mut(constraint as usize);
             *is_torn.ok_or(SceneStateError::Torn { constraint })? = true;
         }
@@ -261,12 +250,6 @@ impl SceneState {
     /// Returns the indices of the torn constraints, ascending.
     pub fn torn_constraints(&self) -> impl Iterator<Item = u32> {
         indices(&self.is_torn)
-    }
-
-    /// Returns the colliders as a node publishes them.
-    pub fn collider_states(&self) -> Vec<ColliderState> {
-        let (step, colliders) = (self.row.step, self.colliders.clone());
-        CollidersRow { step, colliders }.states()
     }
 
     /// Returns the constraints that are not torn.

@@ -5,7 +5,13 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow};
 use recording::{FindStateError, IntactParts, LogEnd, ReadError, RepairError};
+use sim_contract::printable_line;
 use sim_host::{Stop, is_being_written};
+
+use super::output;
+
+/// Most lines about the losses of a file.
+const LOSSES_SHOWN_MAX: usize = 10;
 
 /// A truncated or damaged recording that lacks what a subcommand needs. The program ends with exit code 3.
 #[derive(Debug)]
@@ -20,6 +26,11 @@ impl DamagedInput {
     /// Returns the end of the readable part.
     pub(crate) fn end(&self) -> &LogEnd {
         &self.end
+    }
+
+    /// Prints what the recording has lost.
+    pub(crate) fn note_losses(&self) {
+        note_losses(&self.path, &self.end, &Stop::default());
     }
 }
 
@@ -71,10 +82,33 @@ pub(crate) fn intact_parts(
     }
 }
 
+/// Prints what a recording has lost behind the end of its readable part, as `recorder check` and `recorder repair`
+/// name it.
+pub(crate) fn note_losses(path: &Path, end: &LogEnd, stop: &Stop) {
+    if *end == LogEnd::Complete || is_being_written(path) {
+        return;
+    }
+    let Ok(parts) = IntactParts::find(path, stop) else { return };
+    let lines = parts.losses();
+    for line in lines.iter().take(LOSSES_SHOWN_MAX) {
+        output::note(&printable_line(&format!("  {line}")));
+    }
+    if let Some(more) = lines.len().checked_sub(LOSSES_SHOWN_MAX).filter(|more| *more > 0) {
+        output::note(&format!("  {more} more; `recorder check {}` lists them", path.display()));
+    }
+}
+
+/// Warns about a recording without its end: where the end of its readable part is, and what is lost. `done` is the work that was
+/// done with the readable part.
+pub(crate) fn warn_of_losses(path: &Path, end: &LogEnd, done: &str, stop: &Stop) {
+    output::warn_incomplete(path, end, done);
+    note_losses(path, end, stop);
+}
+
 /// Returns the error of a recording without the state that a subcommand looks for.
 pub(crate) fn lacks_state(path: &Path, error: FindStateError) -> anyhow::Error {
     match error {
-        FindStateError::Missing { problem, end } => lacks(path, &problem, end.as_ref()),
+        FindStateError::Missing { problem, end, .. } => lacks(path, &problem, end.as_ref()),
         FindStateError::Read(error) => error.into(),
     }
 }

@@ -166,7 +166,9 @@ impl Termination for Exit {
 pub(crate) fn from_result(result: anyhow::Result<Exit>) -> Exit {
     result.unwrap_or_else(|error| {
         console::note(&format!("error: {error:#}"));
-        if error.is::<DamagedInput>() { Exit::Loss } else { Exit::Failed }
+        let Some(damaged) = error.downcast_ref::<DamagedInput>() else { return Exit::Failed };
+        damaged.note_losses();
+        Exit::Loss
     })
 }
 

@@ -145,7 +145,7 @@ fn columns<R: Read>(mut log: LogReader<R>, timing: &Timing) -> anyhow::Result<[C
 
 #[cfg(test)]
 mod tests {
-    use recording::{Closing, LogOptions, LogWriter, RunDescription, StepRow, TearsRow, Up};
+    use recording::{Closing, LogOptions, LogWriter, RunDescription, StepRow, TearsRow};
 
     use super::*;
 
@@ -155,16 +155,12 @@ mod tests {
             run_id: 7,
             epoch_ns,
             scene_name: "points".to_owned(),
-            origin: [0.0; 3],
-            up: Up::Y,
             rate_hz: 100,
-            method: 0,
-            particle_count: 0,
             constraint_count: 9,
-            bend_count: 0,
             solver_version: 1,
             contract_version: 1,
             recorder_version: "0".to_owned(),
+            ..RunDescription::default()
         }
     }
 

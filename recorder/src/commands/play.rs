@@ -5,7 +5,6 @@ mod keyboard;
 mod lockstep;
 mod player;
 mod playlist;
-mod position;
 mod recording;
 mod replay;
 #[cfg(test)]
@@ -116,7 +115,8 @@ fn play(args: &PlayArgs, stop: &Stop) -> anyhow::Result<Exit> {
     let played = player.play(stop, || output::note(&ready));
     output::end_live();
     played?;
-    Ok(if player.playlist.is_whole() { Exit::Done } else { Exit::Loss })
+    // Not before the end, because it reads the files again, which delays no snapshot then.
+    Ok(if player.playlist.note_losses() { Exit::Done } else { Exit::Loss })
 }
 
 /// Returns the part to play, or an error if there is nothing in it.

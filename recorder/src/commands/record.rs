@@ -24,7 +24,7 @@ use sim_host::clock::{SECOND_NS, monotonic_ns, realtime_ns, sleep_until};
 use sim_host::{Stop, console, report_bus_errors};
 
 use crate::cli::output::{self, Exit};
-pub(crate) use args::{RecordArgs, SingleStateArgs};
+pub(crate) use args::{RecordArgs, StateArgs};
 use batch::{Messages, StopReason};
 use queue::Queue;
 use report::{LiveLine, Report, Written};

@@ -55,6 +55,9 @@ struct Repaired<'a> {
     lost_head: Option<&'static str>,
     /// Ranges of steps without snapshots.
     lost_steps: Vec<String>,
+    /// The losses for people.
+    #[serde(skip)]
+    missing: Vec<String>,
     /// Topics that were lost, and follow from the scene.
     restored: &'static [&'static str],
     /// The input has its end. Without it, nobody knows what the recorder had not written yet.
@@ -122,10 +125,6 @@ fn copy(
 impl<'a> Repaired<'a> {
     fn new(input: String, output: String, report: &'a RepairReport) -> Self {
         let losses = &report.losses;
-        let mut lost_steps: Vec<_> = losses.ranges().iter().map(ToString::to_string).collect();
-        if losses.more_ranges() > 0 {
-            lost_steps.push(format!("{} more ranges", losses.more_ranges()));
-        }
         Self {
             input,
             output,
@@ -136,7 +135,8 @@ impl<'a> Repaired<'a> {
             snapshot_count: report.counts[Topic::Particles].written,
             lost: losses.messages(),
             lost_head: losses.head(),
-            lost_steps,
+            lost_steps: losses.steps(),
+            missing: losses.lines(),
             restored: &[],
             has_end: report.has_end,
             after_end: report.after_end.as_ref(),
@@ -152,9 +152,7 @@ impl Repaired<'_> {
     fn has_unknown_loss(&self) -> bool {
         !self.is_lossless
             && !self.is_uncertain
-            && self.lost.is_empty()
-            && self.lost_steps.is_empty()
-            && self.lost_head.is_none()
+            && self.missing.is_empty()
             && self.after_end.is_none()
     }
 }
@@ -197,17 +195,7 @@ impl fmt::Display for Repaired<'_> {
             let what = "nothing of this file. It has no end: what was not written then is unknown";
             return write!(f, "\nmissing     {what}");
         }
-        if let Some(what) = self.lost_head {
-            write!(f, "\nmissing     {what}")?;
-        }
-        if !self.lost_steps.is_empty() {
-            write!(f, "\nmissing     steps {}", self.lost_steps.join(", "))?;
-        }
-        let lost: Vec<_> =
-            self.lost.iter().map(|(topic, count)| format!("{topic} {count}")).collect();
-        if !lost.is_empty() {
-            write!(f, "\nmissing     messages: {}", lost.join(", "))?;
-        }
+        self.missing.iter().try_for_each(|what| write!(f, "\nmissing     {what}"))?;
         if self.has_unknown_loss() {
             write!(f, "\nmissing     the damaged part, whose content is unknown")?;
         }

@@ -6,13 +6,13 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context, bail};
-use recording::{FindStateError, FrameReader, LogReader, Wanted, find_state, state_at_place};
+use recording::{FindStateError, LogEnd, LogReader, Wanted, find_state, state_at_place};
 use serde::Serialize;
 use sim_contract::{Action, Client, GivenState, Outcome, scene_hash};
 use sim_host::{Stop, report_bus_errors};
 
 use crate::cli::args::{EndpointArgs, ThreadArgs};
-use crate::cli::damaged_input::{lacks, lacks_state};
+use crate::cli::damaged_input::{lacks, lacks_state, warn_of_losses};
 use crate::cli::output::{self, AsJson, Exit, path_text};
 use crate::cli::parse::{self, whole_number};
 
@@ -83,11 +83,12 @@ pub(crate) fn run(args: &RestoreArgs) -> anyhow::Result<Exit> {
     };
     let rate_hz = log.run().rate_hz;
     let place = find_state(log, wanted).map_err(|error| match args.time {
-        Some(time) => lacks_state_at(&args.file, (time, rate_hz), error, &stop),
+        Some(time) => lacks_state_at(&args.file, time, rate_hz, error),
         None => lacks_state(&args.file, error),
     });
     let place = place.with_context(|| path.clone())?;
     let log = LogReader::open_until(&args.file, &stop).with_context(|| path.clone())?;
+    let (step, end) = (place.step, place.end.clone());
     let state = state_at_place(log, place, args.threads.count(), &stop).context(path)?;
     let given = GivenState {
         scene_hash: state.scene_hash,
@@ -95,8 +96,13 @@ pub(crate) fn run(args: &RestoreArgs) -> anyhow::Result<Exit> {
         keyframe: Some(&state.keyframe),
     };
     let outcome = client.restore(&given, args.timeout)?;
-    let report = check_outcome(&outcome, place.step, state.state_hash)?;
+    let report = check_outcome(&outcome, step, state.state_hash)?;
     output::result(args.as_json, &report, &report.to_string())?;
+    if let Some(end) = end.filter(|end| *end != LogEnd::Complete) {
+        let done =
+            format!("restored step {step}, the last one that was asked for in its readable part");
+        warn_of_losses(&args.file, &end, &done, &stop);
+    }
     Ok(Exit::Done)
 }
 
@@ -131,16 +137,16 @@ fn step_at(time: Duration, rate_hz: u32) -> u64 {
 /// Returns the error of a recording without a complete state up to a time. It names the times that the recording has.
 fn lacks_state_at(
     path: &Path,
-    (time, rate_hz): (Duration, u32),
+    time: Duration,
+    rate_hz: u32,
     error: FindStateError,
-    stop: &Stop,
 ) -> anyhow::Error {
-    let (end, steps) = match (error, complete_steps(path, stop)) {
-        (FindStateError::Missing { end, .. }, Ok(Some(steps))) => (end, steps),
-        (error, _) => return lacks_state(path, error),
-    };
-    let problem = no_state_at(time, rate_hz, &steps);
-    lacks(path, &problem, end.as_ref())
+    match error {
+        FindStateError::Missing { end, steps: Some(steps), .. } => {
+            lacks(path, &no_state_at(time, rate_hz, &steps), end.as_ref())
+        }
+        error => lacks_state(path, error),
+    }
 }
 
 fn no_state_at(time: Duration, rate_hz: u32, steps: &RangeInclusive<u64>) -> String {
@@ -156,19 +162,6 @@ fn no_state_at(time: Duration, rate_hz: u32, steps: &RangeInclusive<u64>) -> Str
         humantime::format_duration(time),
         step_at(time, rate_hz)
     )
-}
-
-/// Returns the steps from the first complete state of a recording to its last snapshot; `None` if it has none.
-fn complete_steps(path: &Path, stop: &Stop) -> anyhow::Result<Option<RangeInclusive<u64>>> {
-    let mut frames = FrameReader::new(LogReader::open_until(path, stop)?);
-    let (mut first, mut last) = (None, 0);
-    while let Some(frame) = frames.next_frame()? {
-        if frame.is_complete_state() {
-            first.get_or_insert(frame.row.step);
-        }
-        last = frame.row.step;
-    }
-    Ok(first.map(|first| first..=last))
 }
 
 fn check_outcome(

@@ -51,7 +51,7 @@ mod tests {
     use std::path::Path;
 
     use clap::Parser;
-    use recording::{LogOptions, LogWriter, RunDescription, Up};
+    use recording::{LogOptions, LogWriter, RunDescription};
 
     use super::*;
 
@@ -65,21 +65,7 @@ mod tests {
 
     /// Runs the subcommand on a recording without an end, as a killed recorder leaves it.
     fn extract(folder: &Path, scene: &[u8], options: &[&str]) -> anyhow::Result<Exit> {
-        let description = RunDescription {
-            run_id: 1,
-            epoch_ns: 0,
-            scene_name: "point".to_owned(),
-            origin: [0.0; 3],
-            up: Up::Y,
-            rate_hz: 240,
-            method: 0,
-            particle_count: 0,
-            constraint_count: 0,
-            bend_count: 0,
-            solver_version: 1,
-            contract_version: 1,
-            recorder_version: "0.1.0".to_owned(),
-        };
+        let description = RunDescription { rate_hz: 240, ..RunDescription::default() };
         let mut bytes = Vec::new();
         let log = LogWriter::create(&mut bytes, LogOptions::default(), &description, scene, 0);
         log.unwrap().flush().unwrap();

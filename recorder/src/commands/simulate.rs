@@ -22,6 +22,7 @@ use sim_host::{Stop, part_path};
 use sim_solver::{Scene, Solver};
 
 use crate::cli::args::{FileArgs, LogFile, ThreadArgs};
+use crate::cli::damaged_input::warn_of_losses;
 use crate::cli::output::{self, AsJson, Exit, progress_bar, progress_spinner, with_usage};
 use crate::cli::parse::whole_number;
 use crate::input::{CommandSource, is_recording, load_scene};
@@ -155,7 +156,7 @@ fn run_recording(args: &SimulateArgs, stop: &Stop) -> anyhow::Result<Exit> {
     let summary = simulated.summary(wall_ns, output.as_deref());
     output::result(args.as_json, &summary, &summary.to_string())?;
     if completed.end != LogEnd::Complete {
-        output::warn_incomplete(path, &completed.end, "simulated as far as it goes");
+        warn_of_losses(path, &completed.end, "simulated as far as it goes", stop);
     }
     let is_complete = completed.end == LogEnd::Complete && !completed.is_interrupted;
     Ok(if is_complete { Exit::Done } else { Exit::Loss })
@@ -178,7 +179,7 @@ fn run_changed(args: &SimulateArgs, stop: &Stop) -> anyhow::Result<Exit> {
     if end == LogEnd::Complete {
         return Ok(exit);
     }
-    output::warn_incomplete(path, &end, "simulated as far as it goes");
+    warn_of_losses(path, &end, "simulated as far as it goes", stop);
     Ok(Exit::Loss)
 }
 

@@ -10,8 +10,8 @@ use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use recording::{
-    LogReader, Message, ReadError, RunDescription, SceneState, SceneStateError, StepRow, Tape,
-    TapeError, TapeState, complete_state,
+    LogReader, Message, ReadError, RecordedState, RunDescription, SceneState, SceneStateError,
+    StepRow, Tape, TapeError, complete_state,
 };
 use sim_contract::SnapshotHeader;
 use sim_solver::Scene;
@@ -107,7 +107,7 @@ impl Recording {
 }
 
 /// Returns the header of a recorded snapshot.
-fn header(run: &RunDescription, state: &TapeState) -> SnapshotHeader {
+fn header(run: &RunDescription, state: &RecordedState) -> SnapshotHeader {
     let row = &state.row;
     SnapshotHeader {
         contract_version: run.contract_version,

@@ -9,8 +9,6 @@ mod marks;
 mod open;
 mod player;
 mod playhead;
-mod resets;
-mod statistics;
 mod texts;
 
 use std::path::Path;
@@ -71,12 +69,7 @@ impl Replay {
 
     fn job(&self) -> Job {
         let Recording { tape, first, .. } = &self.recording;
-        Job {
-            log: tape.log().clone(),
-            first: first.row,
-            last_step: tape.last_step(),
-            torn: tape.topology().torn_before(),
-        }
+        Job { log: tape.log().clone(), first: first.row, last_step: tape.last_step() }
     }
 }
 

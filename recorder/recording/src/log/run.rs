@@ -38,7 +38,7 @@ pub(super) fn header_library(recorder_version: &str) -> String {
 }
 
 /// The recorded run: metadata `run`, at the start of the file.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct RunDescription {
     /// Random id of the run, chosen by the node.
     pub run_id: u64,

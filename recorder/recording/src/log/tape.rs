@@ -5,17 +5,16 @@ mod search;
 
 use std::sync::Arc;
 
-use sim_messages::{ParticleState, StopFlag, Torn};
+use sim_messages::{StopFlag, Torn};
 
 use super::index::IndexedLog;
 use super::message::Message;
 use super::read::frames::FrameReader;
 use super::read_error::{LogEnd, ReadError};
-use super::rows::{
-    CollidersRow, ForcesRow, ParametersRow, StatusRow, StepRow, SurfaceRow, TopologyRow,
-};
+use super::rows::{ForcesRow, StepRow, SurfaceRow, TopologyRow};
 use super::run::RunDescription;
 use super::source::FileSource;
+use super::state::RecordedState;
 use super::tears::{TearChange, TearTracker};
 use super::topic::Topic;
 use chunk_reader::ChunkReader;
@@ -57,33 +56,6 @@ struct TornBase {
     /// The step of the torn constraints. `None` for those before the file.
     step: Option<u64>,
     torn: Torn,
-}
-
-/// The state of a recorded step.
-#[derive(Debug, Clone)]
-pub struct TapeState {
-    /// The header of the snapshot. If it is unreadable, every field except the step is 0.
-    pub row: StepRow,
-    /// The header was readable.
-    pub has_readable_row: bool,
-    /// Shape: particle count.
-    pub particles: Arc<Vec<ParticleState>>,
-    /// The torn constraints.
-    pub torn: Torn,
-    /// The poses of the colliders, if there are any.
-    pub colliders: Option<CollidersRow>,
-    /// The parameters, if the file has readable ones.
-    pub parameters: Option<ParametersRow>,
-    /// The latest status of the node, if there is one.
-    pub status: Option<StatusRow>,
-}
-
-impl TapeState {
-    /// Returns the difference of step and scene step, modulo 2^64, if the header was readable: it changes
-    /// at each load, and with each state that a command puts in place.
-    pub fn beginning(&self) -> Option<u64> {
-        self.has_readable_row.then(|| self.row.step.wrapping_sub(self.row.scene_step))
-    }
 }
 
 impl Tape {
@@ -187,7 +159,7 @@ impl Tape {
     ///
     /// # Errors
     /// If the operating system reports an error or the snapshot has become unreadable.
-    pub fn state_at(&mut self, step: u64) -> Result<TapeState, TapeError> {
+    pub fn state_at(&mut self, step: u64) -> Result<RecordedState, TapeError> {
         let step = step.clamp(self.range.first, self.range.last);
         let missing = || TapeError::NoSnapshot(LogEnd::Complete);
         let SnapshotPosition { chunk, step } = self.find(step)?.ok_or_else(missing)?;
@@ -196,6 +168,7 @@ impl Tape {
         let mut torn = self.torn_at(chunk, step)?;
         if let Some(row) = &row {
             torn.truncate(row.torn_count);
+            torn.header.since_step = row.step.saturating_sub(row.scene_step);
         }
         let has_readable_row = row.is_some();
         let row = row.unwrap_or(StepRow { step, ..StepRow::default() });
@@ -208,7 +181,17 @@ impl Tape {
         let status = self.reader.latest(Topic::Status, chunk, |digest| {
             digest.statuses.iter().rfind(|row| row.step <= step).cloned()
         })?;
-        Ok(TapeState { row, has_readable_row, particles, torn, colliders, parameters, status })
+        Ok(RecordedState {
+            row,
+            has_readable_row,
+            particles,
+            torn,
+            colliders,
+            parameters,
+            rejected_count: status.as_ref().map_or(0, |row| row.rejected_count),
+            status,
+            ..RecordedState::default()
+        })
     }
 
     /// Returns the forces of a recorded step. `None` if the file has none of it: it was recorded without them, or no

@@ -5,8 +5,7 @@ use sim_solver::Keyframe;
 use xxhash_rust::xxh3::{xxh3_64, xxh3_64_with_seed};
 
 use super::message::Message;
-use super::read::frames::Frame;
-use super::rows::{StepRow, TearsRow, TopologyRow};
+use super::rows::{StepRow, TearsRow};
 
 /// A change of the torn constraints.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -20,23 +19,9 @@ pub(crate) enum TearChange {
 
 /// The torn constraints after the messages so far.
 #[derive(Debug, Clone)]
-pub struct TearTracker {
+pub(crate) struct TearTracker {
     torn: Torn,
     is_known: bool,
-}
-
-/// Returns the constraints that were torn before a recording, with the causes in the keyframe of its
-/// first snapshot.
-pub fn torn_before_first(topology: &TopologyRow, first: &Frame) -> Torn {
-    let mut torn = topology.torn_before();
-    let count = torn.constraints.len();
-    if let Some(complete) = first.own_keyframe().and_then(torn_in_keyframe)
-        && complete.indices().take(count).eq(torn.indices())
-    {
-        torn.constraints.copy_from_slice(&complete.constraints[..count]);
-    }
-    torn.header.since_step = first.row.step.saturating_sub(first.row.scene_step);
-    torn
 }
 
 /// Returns the torn constraints in a keyframe, or `None` if it is damaged or has another version.
@@ -66,12 +51,12 @@ impl TearChange {
 
 impl TearTracker {
     /// Starts with the torn constraints of a state, or with those before a file.
-    pub fn new(torn: Torn) -> Self {
+    pub(crate) fn new(torn: Torn) -> Self {
         Self { torn, is_known: true }
     }
 
     /// Processes the next message of the file. Most messages do not concern tears.
-    pub fn process(&mut self, message: &Message) {
+    pub(crate) fn process(&mut self, message: &Message) {
         if let Some(change) = TearChange::from_message(message) {
             self.add(&change);
         }
@@ -92,12 +77,12 @@ impl TearTracker {
 
     /// Marks a part of the file as unreadable. The torn constraints are unknown until the next
     /// keyframe.
-    pub fn mark_gap(&mut self) {
+    pub(crate) fn mark_gap(&mut self) {
         self.is_known = false;
     }
 
     /// Returns the torn constraints, or `None` if they are unknown.
-    pub fn torn(&self) -> Option<&Torn> {
+    pub(crate) fn torn(&self) -> Option<&Torn> {
         self.is_known.then_some(&self.torn)
     }
 }
@@ -124,7 +109,7 @@ pub(in crate::log) fn hash_bytes(particles: &[u8], seed: u64) -> u64 {
 
 /// The seed of the hash of each snapshot, from the messages before it.
 #[derive(Debug)]
-pub(super) struct HashSeeds {
+pub struct HashSeeds {
     tracker: TearTracker,
     /// `step` minus `scene_step` of the newest snapshot: it changes when a state is put in place.
     beginning: Option<u64>,
@@ -141,18 +126,16 @@ struct TornKey {
     count: u32,
 }
 
-impl HashSeeds {
-    pub(super) fn new() -> Self {
-        Self {
-            tracker: TearTracker::new(Torn::default()),
-            beginning: None,
-            replacement_step: None,
-            newest: None,
-        }
+impl Default for HashSeeds {
+    fn default() -> Self {
+        let tracker = TearTracker::new(Torn::default());
+        Self { tracker, beginning: None, replacement_step: None, newest: None }
     }
+}
 
+impl HashSeeds {
     /// Processes a message between snapshots.
-    pub(super) fn process(&mut self, message: &Message) {
+    pub fn process(&mut self, message: &Message) {
         self.replacement_step = message.replacement_step().max(self.replacement_step);
         if let Message::Topology(row) = message
             && self.beginning.is_none()
@@ -164,9 +147,15 @@ impl HashSeeds {
     }
 
     /// Marks a part of the file as missing.
-    pub(super) fn mark_gap(&mut self) {
+    pub fn mark_gap(&mut self) {
         self.tracker.mark_gap();
         self.newest = None;
+    }
+
+    /// Compares a snapshot with the hash in its header. Returns `None` if its torn constraints are unknown.
+    pub fn is_equal(&mut self, row: &StepRow, particles: &[ParticleState]) -> Option<bool> {
+        let seed = self.seed(row)?;
+        Some(hash_bytes(bytemuck::cast_slice(particles), seed) == row.state_hash)
     }
 
     /// Returns the seed for a snapshot, or `None` if its torn constraints are unknown.
@@ -199,10 +188,9 @@ impl HashSeeds {
 #[cfg(test)]
 mod tests {
     use sim_messages::{Action, Command, Outcome, TearCause, TearsHeader};
-    use sim_solver::{Scene, Solver, builtin};
 
     use super::*;
-    use crate::log::rows::{OutcomeRow, StepRow};
+    use crate::log::rows::OutcomeRow;
 
     fn tears(step: u64, constraints: &[u32]) -> Message {
         let causes = vec!["cut".to_owned(); constraints.len()];
@@ -252,33 +240,6 @@ mod tests {
         tracker.mark_gap();
         tracker.process(&Message::Keyframe { step: 3, bytes: vec![1, 2, 3] });
         assert_eq!(tracker.torn(), None);
-    }
-
-    #[test]
-    fn the_first_keyframe_has_the_causes_of_earlier_tears() {
-        let scene = Scene::from_toml(builtin::text("rope").unwrap(), "rope").unwrap();
-        let mut solver = Solver::new(&scene);
-        solver.cut(3).unwrap();
-        solver.step();
-        let causes = |torn: &[u32], bytes: Vec<u8>| {
-            let topology = TopologyRow {
-                torn: torn.to_vec(),
-                ..TopologyRow::new(&sim_messages::LoadHeader::default(), &[], &[])
-            };
-            let first = Frame {
-                updates: vec![Message::Keyframe { step: 1, bytes }],
-                row: StepRow { step: 1, ..StepRow::default() },
-                particles: None,
-                log_times_ns: Vec::new(),
-            };
-            let torn = torn_before_first(&topology, &first);
-            torn.constraints.iter().map(TornConstraint::cause).collect::<Vec<_>>()
-        };
-        let keyframe = solver.keyframe().encode();
-        assert_eq!(causes(&[3], keyframe.clone()), [Some(TearCause::Cut)]);
-        assert_eq!(causes(&[], keyframe.clone()), []);
-        assert_eq!(causes(&[4], keyframe), [None], "a keyframe of another state");
-        assert_eq!(causes(&[3], vec![0; 9]), [None], "a damaged keyframe");
     }
 }
 

@@ -89,10 +89,10 @@ impl ExtentTracker {
     /// Adds a frame.
     pub fn add(&mut self, state: &SceneState) {
         self.particles = union(self.particles, extent_of_particles(&state.particles));
-        if self.colliders.len() < state.colliders.len() {
-            self.colliders.resize(state.colliders.len(), None);
+        if self.colliders.len() < state.colliders().len() {
+            self.colliders.resize(state.colliders().len(), None);
         }
-        let colliders = self.colliders.iter_mut().zip(&state.colliders);
+        let colliders = self.colliders.iter_mut().zip(state.colliders());
         for (index, (known, collider)) in colliders.enumerate() {
             let extent = match state.collider_mesh(index) {
                 Some(mesh) => Extent::around(mesh_corners(&collider.shape, mesh)),

@@ -184,7 +184,7 @@ impl MeshDrawing<'_> {
         let scale = self.camera.line_scale();
         let radius = RADIUS * scale * ratio.clamp(DOT_MIN, 1.0);
         let marked_radius = radius.max(MARKED_RADIUS_MIN * scale) * 1.4;
-        for (index, state) in (0_u32..).zip(particles) {
+        for (index, state) in (0_u32..).zip(particles.iter()) {
             let place = index as usize;
             let is_marked = state.flags & MARKED_FLAGS != 0;
             let is_shown = match self.style {

@@ -36,7 +36,7 @@ const EDGES: [[usize; 2]; 12] = [
 
 /// Returns the shapes of all colliders. Planes are clipped to `room`.
 pub(crate) fn shapes(state: &SceneState, camera: &Camera, room: &Extent) -> Vec<Shape> {
-    let mut order: Vec<_> = state.colliders.iter().map(|one| &one.shape).enumerate().collect();
+    let mut order: Vec<_> = state.colliders().iter().map(|one| &one.shape).enumerate().collect();
     // The sort is stable, so ties keep the order of their index.
     order.sort_by(|(_, one), (_, other)| {
         let [one, other] = [one, other].map(|shape| depth(shape, camera));
@@ -187,7 +187,7 @@ mod tests {
     use sim_solver::scene::Up;
 
     use super::*;
-    use crate::log::{ColliderDetails, ColliderRow};
+    use crate::log::{ColliderDetails, ColliderRow, CollidersRow};
     use crate::pictures::{Basis, Size, View};
 
     const ROOM: Extent = Extent { min: DVec3::NEG_ONE, max: DVec3::ONE };
@@ -282,7 +282,8 @@ mod tests {
             details: ColliderDetails::default(),
         };
         let colliders = [near, cube(), bounds, plane_at([0.0, 1.0, 0.0], 0.0)].map(collider);
-        let state = SceneState { colliders: colliders.into(), ..SceneState::default() };
+        let mut state = SceneState::default();
+        state.colliders = Some(CollidersRow { step: 0, colliders: colliders.into() });
         let drawn = shapes(&state, &camera(View::Front), &ROOM);
         assert_eq!(drawn.len(), 1 + EDGES.len() + 1 + 1);
         assert!(matches!(drawn[0], Shape::Polygon { fill: PLANE_FILL, .. }));

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::sync::atomic::AtomicBool;
 
-use crate::log::{EnergyRow, Frame, Message, OutcomeRow, StepRow, TearTracker, Topic};
+use crate::log::{EnergyRow, Frame, Message, OutcomeRow, RecordedState, StepRow, Topic};
 use sim_messages::{Action, Outcome, ParticleState, RestoreContents};
 use sim_solver::{Applied, Control, EnergyMeter, Keyframe, Scene, Solver};
 
@@ -489,9 +489,9 @@ fn has_other_tears(frame: &Frame, solver: &Solver) -> bool {
         _ => None,
     });
     let Some(torn) = torn else { return false };
-    let mut tracker = TearTracker::new(torn);
-    frame.updates.iter().for_each(|update| tracker.process(update));
-    let Some(torn) = tracker.torn() else { return false };
+    let mut state = RecordedState { torn, ..RecordedState::default() };
+    frame.updates.iter().for_each(|update| state.apply(update));
+    let torn = state.torn;
     let expected = solver.torn().iter().zip(solver.tear_causes());
     torn.constraints.len() != solver.torn().len()
         || torn.constraints.iter().zip(expected).any(|(found, (index, cause))| {

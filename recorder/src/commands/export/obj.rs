@@ -54,7 +54,7 @@ pub(super) fn mesh(state: &SceneState, faces: &Faces) -> Result<String, fmt::Err
 /// Writes the particles and the intact faces. A scene without faces has a line for each untorn constraint.
 /// Indices count from 1.
 fn write_mesh(text: &mut String, state: &SceneState, faces: &Faces) -> fmt::Result {
-    for particle in &state.particles {
+    for particle in state.particles.iter() {
         let [x, y, z] = particle.position;
         writeln!(text, "v {x:?} {y:?} {z:?}")?;
     }
@@ -158,7 +158,7 @@ fn write_positions(snapshots: &Snapshots<'_>, out: &mut dyn io::Write) -> anyhow
     out.write_all(&FRAMES_PER_SAMPLE.to_le_bytes())?;
     out.write_all(&count(snapshots.frame_numbers().len())?.to_le_bytes())?;
     snapshots.for_each_frame(|frame| {
-        for particle in &frame.state.particles {
+        for particle in frame.state.particles.iter() {
             out.write_all(bytemuck::bytes_of(&particle.position))?;
         }
         Ok(())

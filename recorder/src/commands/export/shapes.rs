@@ -169,12 +169,12 @@ impl Colliders {
     /// Returns the colliders, or `None` if there are none.
     pub(super) fn of(snapshots: &Snapshots<'_>) -> anyhow::Result<Option<Self>> {
         let first = snapshots.first()?;
-        if first.colliders.is_empty() {
+        if first.colliders().is_empty() {
             return Ok(None);
         }
         let mut tracker = ExtentTracker::default();
         let is_plane = |shape: &ShapeRow| matches!(shape, ShapeRow::Plane { .. });
-        if first.colliders.iter().any(|one| is_plane(&one.shape)) {
+        if first.colliders().iter().any(|one| is_plane(&one.shape)) {
             snapshots.for_each(|state| {
                 tracker.add(state);
                 Ok(())
@@ -190,7 +190,7 @@ impl Colliders {
 
     /// Returns the mesh and the pose of each collider whose pose is finite and whose triangles are known.
     pub(super) fn solids(&self, state: &SceneState) -> impl Iterator<Item = (usize, Solid, Pose)> {
-        let colliders = state.colliders.iter().enumerate();
+        let colliders = state.colliders().iter().enumerate();
         colliders.filter_map(move |(index, one)| {
             Some((index, self.solid(state, index)?, self.pose(&one.shape)?))
         })
@@ -222,7 +222,7 @@ impl Colliders {
 
     /// Returns the mesh of a collider in its own frame.
     pub(super) fn solid(&self, state: &SceneState, collider: usize) -> Option<Solid> {
-        Some(match state.colliders.get(collider)?.shape {
+        Some(match state.colliders().get(collider)?.shape {
             ShapeRow::Plane { .. } => {
                 let size = (self.room.max - self.room.min).length();
                 square(if size > 0.0 { size } else { 1.0 })

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::io::Read;
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
 use anyhow::bail;
 use glam::DQuat;
@@ -249,12 +250,14 @@ impl Snapshots<'_> {
 
 /// Sets the particles and the colliders of a state to those between two snapshots.
 fn interpolate(state: &mut SceneState, [before, after]: [&SceneState; 2], share: f64) {
-    state.particles.clone_from(&before.particles);
-    for (particle, target) in state.particles.iter_mut().zip(&after.particles) {
+    let particles = Arc::make_mut(&mut state.particles);
+    particles.clone_from(&before.particles);
+    for (particle, target) in particles.iter_mut().zip(after.particles.iter()) {
         move_particle(particle, target, share);
     }
     state.colliders.clone_from(&before.colliders);
-    for (collider, target) in state.colliders.iter_mut().zip(&after.colliders) {
+    let colliders = state.colliders.iter_mut().flat_map(|row| &mut row.colliders);
+    for (collider, target) in colliders.zip(after.colliders()) {
         move_collider(collider, target, share);
     }
 }

@@ -6,6 +6,7 @@ mod data;
 use std::collections::BTreeMap;
 use std::fs;
 use std::io::Cursor;
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use clap::Parser;
@@ -13,8 +14,10 @@ use recording::pictures::{
     Basis, Camera, ExtentTracker, Picture, Renderer, Shape, encode_png, encode_svg,
 };
 use recording::simulation::{Job, States, simulate};
-use recording::{Closing, Existing, LogOptions, LogWriter, Message, RunDescription, StepRow, Up};
-use sim_contract::{ConstraintState, ParticleFlags, ParticleState, Triangle};
+use recording::{
+    Closing, Existing, LogOptions, LogWriter, Message, RecordedState, RunDescription, StepRow, Up,
+};
+use sim_contract::{ConstraintState, ParticleFlags, ParticleState, TornConstraint, Triangle};
 use sim_solver::{Scene, Solver};
 
 use super::*;
@@ -51,18 +54,9 @@ const TINY: &str = r#"
 fn run_at(rate_hz: u32) -> RunDescription {
     RunDescription {
         run_id: 1,
-        epoch_ns: 0,
         scene_name: "tiny".to_owned(),
-        origin: [0.0; 3],
-        up: Up::Y,
         rate_hz,
-        method: 0,
-        particle_count: 0,
-        constraint_count: 0,
-        bend_count: 0,
-        solver_version: 1,
-        contract_version: 1,
-        recorder_version: "0.1.0".to_owned(),
+        ..RunDescription::default()
     }
 }
 
@@ -231,15 +225,19 @@ fn square() -> SceneState {
     let constraint =
         |(a, b, kind)| ConstraintState { a, b, rest_length: 1.0, compliance: 0.0, kind };
     let edges = [(0, 1, 0), (0, 2, 0), (1, 3, 0), (2, 3, 0), (1, 2, 1)];
+    let particles =
+        places.map(|position| ParticleState { position, ..ParticleState::default() }).to_vec();
     SceneState {
-        particles: places
-            .map(|position| ParticleState { position, ..ParticleState::default() })
-            .to_vec(),
+        recorded: RecordedState { particles: particles.into(), ..RecordedState::default() },
         constraints: edges.map(constraint).to_vec(),
         is_torn: vec![false; edges.len()],
         triangles: [[0, 1, 2], [1, 3, 2]].map(|corners| Triangle { corners }).to_vec(),
         ..SceneState::default()
     }
+}
+
+fn particles(state: &mut SceneState) -> &mut Vec<ParticleState> {
+    Arc::make_mut(&mut state.particles)
 }
 
 fn draw(state: &SceneState) -> Picture {
@@ -278,7 +276,8 @@ fn torn_constraints_and_triangles_with_a_torn_side_are_left_out() {
         (&[4], [0, 5, 4]),
         (&[5], [2, 5, 4]),
     ] {
-        state.set_torn(torn.iter().copied()).unwrap();
+        state.torn = torn.iter().map(|index| TornConstraint::new(*index, None)).collect();
+        state.update_torn().unwrap();
         assert_eq!(counts(&draw(&state)), expected, "{torn:?}");
     }
 }
@@ -287,12 +286,13 @@ fn torn_constraints_and_triangles_with_a_torn_side_are_left_out() {
 #[test]
 fn a_shaded_surface_has_neither_wires_nor_dots_and_a_rope_keeps_its_line() {
     let mut state = square();
-    state.particles[0].flags = ParticleFlags::PINNED;
+    particles(&mut state)[0].flags = ParticleFlags::PINNED;
     let picture = draw_in(Style::Shaded, &state);
     assert_eq!(counts(&picture), [2, 0, 0]);
     assert!(!picture.shapes.iter().any(|one| matches!(one, Shape::Text(_))), "it has a caption");
     for x in [2.0, 3.0, 4.0] {
-        state.particles.push(ParticleState { position: [x, 0.0, 0.0], ..ParticleState::default() });
+        particles(&mut state)
+            .push(ParticleState { position: [x, 0.0, 0.0], ..ParticleState::default() });
     }
     state.constraints.push(ConstraintState { a: 3, b: 4, ..state.constraints[0] });
     state.constraints.push(ConstraintState { a: 4, b: 5, ..state.constraints[0] });
@@ -300,7 +300,7 @@ fn a_shaded_surface_has_neither_wires_nor_dots_and_a_rope_keeps_its_line() {
     assert_eq!(counts(&draw_in(Style::Shaded, &state)), [2, 2, 1]);
     assert_eq!(counts(&draw(&state)), [3, 7, 6]);
     // The two triangles are bent against each other, and share the brightness of their corners.
-    state.particles[3].position[2] = 1.0;
+    particles(&mut state)[3].position[2] = 1.0;
     let fills = |picture: &Picture| {
         let fill = |shape: &Shape| match shape {
             Shape::Polygon { fill, .. } => Some(*fill),
@@ -317,9 +317,9 @@ fn a_shaded_surface_has_neither_wires_nor_dots_and_a_rope_keeps_its_line() {
 #[test]
 fn pinned_particles_are_squares_and_non_finite_ones_are_left_out() {
     let mut state = square();
-    state.particles[0].flags = ParticleFlags::PINNED;
+    particles(&mut state)[0].flags = ParticleFlags::PINNED;
     assert_eq!(counts(&draw(&state)), [3, 5, 3]);
-    state.particles[3].position = [f32::NAN, f32::INFINITY, 1e30];
+    particles(&mut state)[3].position = [f32::NAN, f32::INFINITY, 1e30];
     assert_eq!(counts(&draw(&state)), [2, 3, 2]);
     assert!(encode_png(&draw(&state)).is_ok());
 }
@@ -329,10 +329,10 @@ fn lines_behind_a_triangle_are_hidden_and_lines_on_it_are_not() {
     let mut state = square();
     // A second square behind the first one.
     let mut behind = square();
-    for (index, particle) in behind.particles.iter_mut().enumerate() {
+    for (index, particle) in particles(&mut behind).iter_mut().enumerate() {
         particle.position[2] = if index == 0 { -1.0 } else { -2.0 };
     }
-    state.particles.extend(behind.particles);
+    particles(&mut state).extend(behind.particles.iter());
     state.constraints.push(ConstraintState { a: 5, b: 6, ..state.constraints[0] });
     state.is_torn.push(false);
     state.triangles.push(Triangle { corners: [4, 5, 6] });
@@ -365,7 +365,7 @@ fn a_recording_without_a_scene_is_drawn() {
     let mut log =
         LogWriter::create(Vec::new(), LogOptions::default(), &run_at(100), b"", 0).unwrap();
     let row = StepRow { step: 3, ..StepRow::default() };
-    let particles = square().particles;
+    let particles = square().particles.to_vec();
     log.write(&Message::Step(row), 0).unwrap();
     log.write(&Message::Particles { step: 3, particles }, 0).unwrap();
     let file = log.finish(&Closing::default()).unwrap();

@@ -243,9 +243,9 @@ fn write_colliders(
     colliders: &Colliders,
 ) -> anyhow::Result<()> {
     let first = snapshots.first()?;
-    let mut samples = vec![PoseSamples::default(); first.colliders.len()];
+    let mut samples = vec![PoseSamples::default(); first.colliders().len()];
     snapshots.for_each_frame(|frame| {
-        for (samples, collider) in samples.iter_mut().zip(&frame.state.colliders) {
+        for (samples, collider) in samples.iter_mut().zip(frame.state.colliders()) {
             samples.add(frame.number, colliders.pose(&collider.shape));
         }
         Ok(())

@@ -142,7 +142,7 @@ fn column<T: bytemuck::NoUninit>(
     value: impl Fn(&ParticleState) -> T,
 ) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(state.particles.len() * size_of::<T>());
-    for particle in &state.particles {
+    for particle in state.particles.iter() {
         bytes.extend_from_slice(bytemuck::bytes_of(&value(particle)));
     }
     bytes

@@ -50,10 +50,10 @@ pub(super) enum SeekTarget {
 impl Request {
     /// Returns the change that a command asks for. Rejects commands that would change the recording.
     pub(super) fn from_action(action: &Action) -> Result<Self, Reason> {
+        action.validate()?;
         Ok(match *action {
             Action::Pause => Self::Pause,
             Action::Resume => Self::Resume,
-            Action::Step { count: 0 } => return Err(Reason::OutOfRange),
             Action::Step { count } => Self::Step(count.into()),
             Action::Rewind { to_step: Some(step), back_steps: None } => {
                 Self::Seek(SeekTarget::Step(step))
@@ -243,10 +243,10 @@ mod tests {
             (set("time_scale", 0.1), Ok(Request::Rate(0.1))),
             (set("time_scale", 100.0), Ok(Request::Rate(100.0))),
             (set("time_scale", 0.0), Err(Reason::OutOfRange)),
-            (set("time_scale", f32::NAN), Err(Reason::OutOfRange)),
+            (set("time_scale", f32::NAN), Err(Reason::NonFinite)),
             (set("time_scale", 100.1), Err(Reason::OutOfRange)),
             (set("damping", 0.1), Err(Reason::NoEffectHere)),
-            (set("colour", 0.1), Err(Reason::NoEffectHere)),
+            (set("colour", 0.1), Err(Reason::UnknownParameter)),
             (Action::Pin { particle: 0 }, Err(Reason::NoEffectHere)),
             (Action::Reset, Err(Reason::NoEffectHere)),
             (Action::Unknown { number: 99 }, Err(Reason::NoEffectHere)),

@@ -114,8 +114,8 @@ impl Player {
     }
 
     fn begin_run(&mut self, owner: Option<Owner>, place: Place) -> anyhow::Result<(Replay, Frame)> {
-        let Start { frame, position } = self.playlist.start_at(place)?;
-        let replay = Replay::new(&self.endpoint, owner, &self.playlist.recorded()?, position)?;
+        let Start { frame, state } = self.playlist.start_at(place)?;
+        let replay = Replay::new(&self.endpoint, owner, &self.playlist.recorded()?, state)?;
         self.control.begin_run();
         self.lockstep.begin_run();
         self.pace.restart();
@@ -215,7 +215,7 @@ impl Player {
         }
         replay.publish(frame)?;
         self.control.count_step();
-        let next = self.playlist.next_frame(replay.position())?;
+        let next = self.playlist.next_frame(replay.state())?;
         Ok(next.filter(|frame| self.playlist.time_ns(frame.row.step) <= self.plan.end_ns))
     }
 
@@ -275,7 +275,7 @@ impl Player {
         if let Some(step) = replay.take_step_to_complete()
             && let Some(bytes) = self.playlist.keyframe_of(step)?
         {
-            replay.complete(step, &bytes)?;
+            replay.complete(step, bytes)?;
         }
         Ok(())
     }

@@ -1,15 +1,16 @@
 //! The files of a replay, played one after another on one timeline.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use anyhow::Context;
-use recording::{ContentSelection, Frame, LogEnd, RunDescription, StepRow, counted};
+use recording::{ContentSelection, Frame, LogEnd, RecordedState, RunDescription, StepRow, counted};
 use sim_host::Stop;
 use sim_host::clock::SECOND_NS;
 
-use super::position::Position;
 use super::recording::{Recording, Start};
 use super::replay::Recorded;
+use crate::cli::damaged_input::note_losses;
 use crate::cli::output;
 
 /// A recorded step of a file.
@@ -27,8 +28,8 @@ pub(super) struct Playlist {
     /// The file that is being read.
     current: usize,
     recording: Recording,
-    /// Every file that has ended was complete.
-    is_whole: bool,
+    /// The files that have ended without being complete, by number.
+    incomplete: BTreeMap<usize, LogEnd>,
     stop: Stop,
 }
 
@@ -73,7 +74,7 @@ impl Playlist {
             first.get_or_insert(recording);
         }
         let recording = first.context("there is no file to play")?;
-        Ok(Self { files, current: 0, recording, is_whole: true, stop: stop.clone() })
+        Ok(Self { files, current: 0, recording, incomplete: BTreeMap::new(), stop: stop.clone() })
     }
 
     /// Returns the time from the first to the last snapshot.
@@ -147,7 +148,7 @@ impl Playlist {
     }
 
     /// Returns the next snapshot of the run, or `None` at its end. `reached` is the state after the last one.
-    pub(super) fn next_frame(&mut self, reached: &Position) -> anyhow::Result<Option<Frame>> {
+    pub(super) fn next_frame(&mut self, reached: &RecordedState) -> anyhow::Result<Option<Frame>> {
         if let Some(frame) = self.recording.next_frame().with_context(|| self.name())? {
             return Ok(Some(frame));
         }
@@ -166,9 +167,12 @@ impl Playlist {
         Ok(Some(frame))
     }
 
-    /// Returns `true` if every file that has ended was complete.
-    pub(super) fn is_whole(&self) -> bool {
-        self.is_whole
+    /// Prints what the files that have ended have lost. Returns `true` if every one was complete.
+    pub(super) fn note_losses(&self) -> bool {
+        for (file, end) in &self.incomplete {
+            note_losses(&self.files[*file].path, end, &self.stop);
+        }
+        self.incomplete.is_empty()
     }
 
     fn name(&self) -> String {
@@ -221,8 +225,8 @@ impl Playlist {
         let Some(end) = self.recording.end() else { return true };
         let is_complete = *end == LogEnd::Complete;
         if !is_complete {
-            self.is_whole = false;
             output::warn_incomplete(self.recording.path(), end, "played as far as it goes");
+            self.incomplete.insert(self.current, end.clone());
         }
         is_complete
     }

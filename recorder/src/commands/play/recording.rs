@@ -1,19 +1,19 @@
 //! One file of a replay, read forward from any step.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::Context;
 use recording::{
     CollidersRow, CompleteStateError, ContentSelection, FileSource, Frame, FrameReader, LogEnd,
-    LogReader, Message, RecordedSceneError, RunDescription, StepRow, Tape, complete_state, counted,
-    open_recording, recorded_scene, torn_before_first,
+    LogReader, Message, RecordedSceneError, RecordedState, RunDescription, StepRow, Tape,
+    complete_state, counted, open_recording, recorded_scene,
 };
 use sim_contract::BendState;
 use sim_host::Stop;
 use sim_solver::Solver;
 
-use super::position::Position;
 use super::replay::Recorded;
 use crate::cli::damaged_input::lacks;
 use crate::cli::output;
@@ -48,15 +48,19 @@ struct Needs {
 #[derive(Debug)]
 pub(super) struct Start {
     pub(super) frame: Frame,
-    pub(super) position: Position,
+    pub(super) state: RecordedState,
 }
 
 impl Start {
     /// Returns the first snapshot of a file as the next one of the run that has reached a state, with the last
     /// messages of the file before: without every snapshot of the run, they follow the last one. Returns
     /// `None` if they do not lead to the state with which this file begins.
-    pub(super) fn continue_from(self, reached: &Position, trailing: &[Message]) -> Option<Frame> {
-        let Self { mut frame, position: mut begun } = self;
+    pub(super) fn continue_from(
+        self,
+        reached: &RecordedState,
+        trailing: &[Message],
+    ) -> Option<Frame> {
+        let Self { mut frame, state: mut begun } = self;
         frame.updates.iter().for_each(|update| begun.apply(update));
         let step = frame.row.step;
         // The file repeats what was latched before its first step.
@@ -68,7 +72,7 @@ impl Start {
         frame.updates = earlier.chain(own).collect();
         let mut reached = reached.clone();
         frame.updates.iter().for_each(|update| reached.apply(update));
-        reached.agrees_with(&begun).then_some(frame)
+        agree(&reached, &begun).then_some(frame)
     }
 }
 
@@ -154,12 +158,9 @@ impl Recording {
     pub(super) fn start(&mut self) -> anyhow::Result<Start> {
         self.tape.rewind(&mut self.frames);
         let frame = next_frame(&self.path, &mut self.frames)?;
-        let torn = torn_before_first(self.tape.topology(), &frame);
-        let mut position = Position::new(torn);
-        // The load has the parameters of its first snapshot.
-        frame.updates.iter().for_each(|update| position.apply_parameters(update));
+        let state = RecordedState::before_first(self.tape.topology(), &frame);
         self.last_row = Some(frame.row);
-        Ok(Start { frame, position })
+        Ok(Start { frame, state })
     }
 
     fn start_in_the_middle(&mut self, step: u64) -> anyhow::Result<Start> {
@@ -176,7 +177,9 @@ impl Recording {
             Some(bytes) => Some((step, bytes)),
             None => self.tape.keyframe_at(step)?,
         };
-        let position = Position::at(&state, keyframe);
+        if let Some((step, bytes)) = keyframe {
+            state.set_keyframe(step, bytes);
+        }
         self.tape.wind(&mut self.frames, step)?;
         self.last_row = Some(state.row);
         let frame = Frame {
@@ -185,7 +188,7 @@ impl Recording {
             particles: Some(state.particles.to_vec()),
             log_times_ns: Vec::new(),
         };
-        Ok(Start { frame, position })
+        Ok(Start { frame, state })
     }
 
     /// Returns the keyframe of a recorded step, simulated if it has none of its own; `None` if the recording
@@ -230,6 +233,15 @@ impl Recording {
     pub(super) fn end(&self) -> Option<&LogEnd> {
         self.frames.end()
     }
+}
+
+/// Returns `true` if the torn constraints, colliders and parameters are the same in both, as far as they are known.
+fn agree(one: &RecordedState, two: &RecordedState) -> bool {
+    let torn = |state: &RecordedState| state.torn.indices().collect::<BTreeSet<_>>();
+    let are_known = one.colliders.is_some() && two.colliders.is_some();
+    (!are_known || one.collider_states() == two.collider_states())
+        && one.parameter_values() == two.parameter_values()
+        && torn(one) == torn(two)
 }
 
 fn next_frame(path: &Path, frames: &mut FrameReader<FileSource>) -> anyhow::Result<Frame> {

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use anyhow::{Context, bail};
 use recording::{
-    CollidersRow, ForcesRow, Frame, Message, RunDescription, StatusRow, SurfaceRow, TopologyRow,
+    CollidersRow, ForcesRow, Frame, Message, RecordedState, RunDescription, SurfaceRow, TopologyRow,
 };
 use sim_contract::{
     BendState, CONTRACT_VERSION, CollidersHeader, Command, Endpoint, ForcesHeader, KeyframeHeader,
@@ -16,7 +16,6 @@ use sim_host::clock::monotonic_ns;
 
 use super::control::Control;
 use super::lockstep::{Lockstep, Published};
-use super::position::Position;
 
 /// The part of a recording that the owner of a name needs.
 #[derive(Debug)]
@@ -50,7 +49,8 @@ pub(crate) struct Replay {
     owner: Owner,
     run: RunDescription,
     run_id: u64,
-    position: Position,
+    /// The state after the last published snapshot, without its particles.
+    state: RecordedState,
     /// The last published list of torn constraints.
     published_torn: Torn,
     /// The last published parameters.
@@ -59,8 +59,6 @@ pub(crate) struct Replay {
     step: Option<u64>,
     /// The index of the next snapshot. A run counts from 0, so that readers know when they miss its start.
     next_index: u32,
-    /// The latest recorded status of the node.
-    status: Option<StatusRow>,
     /// Readers of keyframes at the last check.
     keyframe_reader_count: usize,
     /// A reader has joined the keyframes since the newest one.
@@ -76,7 +74,7 @@ impl Replay {
         endpoint: &Endpoint,
         owner: Option<Owner>,
         recorded: &Recorded<'_>,
-        mut position: Position,
+        state: RecordedState,
     ) -> anyhow::Result<Self> {
         let Recorded { run, scene, topology, bends, surface, .. } = *recorded;
         let run_id = getrandom::u64().context("cannot get a random run id")?;
@@ -94,7 +92,7 @@ impl Replay {
             triangles: &triangles,
             collider_count: recorded.collider_count,
             keyframe_size_bytes_max: recorded.keyframe_size_bytes_max,
-            parameters: position.parameters.clone(),
+            parameters: state.parameter_values(),
         };
         let owner = own(endpoint, owner, &load)?;
         let run = run.clone();
@@ -103,9 +101,8 @@ impl Replay {
             run,
             run_id,
             published_torn: Torn::default(),
-            published_parameters: position.parameters.clone(),
-            status: position.latched_status.take(),
-            position,
+            published_parameters: state.parameter_values(),
+            state,
             step: None,
             next_index: 0,
             keyframe_reader_count: 0,
@@ -119,9 +116,9 @@ impl Replay {
         &self.owner
     }
 
-    /// Returns the state after the last published snapshot.
-    pub(super) fn position(&self) -> &Position {
-        &self.position
+    /// Returns the state after the last published snapshot, without its particles.
+    pub(super) fn state(&self) -> &RecordedState {
+        &self.state
     }
 
     /// Returns the last published step, or step 0 of the run before the first.
@@ -137,12 +134,13 @@ impl Replay {
     /// Publishes the latched messages before the first snapshot: the colliders, the torn constraints
     /// and the newest keyframe. A late subscriber of the node would have received them.
     pub(crate) fn publish_latched(&mut self) -> anyhow::Result<()> {
-        if let Some(row) = self.position.latched_colliders.take() {
-            self.publish_colliders(&row)?;
+        if let Some(row) = &self.state.colliders {
+            self.publish_colliders(row)?;
         }
         self.publish_tears()?;
-        if let Some(bytes) = self.position.latched_keyframe.take() {
-            self.publish_keyframe(self.position.keyframe_step, &bytes)?;
+        if let Some((step, bytes)) = &self.state.keyframe {
+            self.publish_keyframe(*step, bytes)?;
+            self.is_keyframe_wanted = false;
         }
         Ok(())
     }
@@ -158,7 +156,7 @@ impl Replay {
             );
         }
         for update in &frame.updates {
-            self.position.apply(update);
+            self.state.apply(update);
             if let Message::Colliders(row) = update {
                 self.publish_colliders(row)?;
             }
@@ -168,7 +166,8 @@ impl Replay {
         for update in &frame.updates {
             self.publish_update(update)?;
         }
-        let header = self.header(frame);
+        self.state.apply(&Message::Step(frame.row));
+        let header = self.header();
         self.owner.publish_particles(&header, |index| particles[index])?;
         self.next_index = self.next_index.wrapping_add(1);
         self.owner.wake(Wake::Frame);
@@ -181,13 +180,13 @@ impl Replay {
             Message::Forces(row) => self.publish_forces(row)?,
             Message::Keyframe { step, bytes } => {
                 self.publish_keyframe(*step, bytes)?;
+                self.is_keyframe_wanted = false;
             }
             Message::Outcome(row) => {
                 let outcome = Outcome { run_id: self.run_id, ..Outcome::from(row) };
                 self.owner.publish_outcome(&outcome)?;
                 self.owner.wake(Wake::Outcome);
             }
-            Message::Status(row) => self.status = Some(row.clone()),
             // The other messages are published already, or have no service.
             _ => {}
         }
@@ -208,11 +207,9 @@ impl Replay {
         Ok(())
     }
 
-    fn publish_keyframe(&mut self, step: u64, bytes: &[u8]) -> anyhow::Result<()> {
+    fn publish_keyframe(&self, step: u64, bytes: &[u8]) -> anyhow::Result<()> {
         let header = KeyframeHeader { run_id: self.run_id, step, ..KeyframeHeader::default() };
-        self.owner.publish_keyframe(header, bytes)?;
-        self.is_keyframe_wanted = false;
-        Ok(())
+        Ok(self.owner.publish_keyframe(header, bytes)?)
     }
 
     /// Returns the last published step once after a reader has joined the keyframes, if it has none yet.
@@ -220,21 +217,21 @@ impl Replay {
         let before =
             std::mem::replace(&mut self.keyframe_reader_count, self.owner.keyframe_reader_count());
         self.is_keyframe_wanted |= self.keyframe_reader_count > before;
-        let step = self.step.filter(|step| self.position.keyframe_step != *step)?;
+        let step = self.step.filter(|step| self.state.keyframe_step() != *step)?;
         std::mem::take(&mut self.is_keyframe_wanted).then_some(step)
     }
 
     /// Publishes the keyframe of the last snapshot after it.
-    pub(super) fn complete(&mut self, step: u64, bytes: &[u8]) -> anyhow::Result<()> {
-        self.position.keyframe_step = step;
-        self.publish_keyframe(step, bytes)?;
+    pub(super) fn complete(&mut self, step: u64, bytes: Vec<u8>) -> anyhow::Result<()> {
+        self.publish_keyframe(step, &bytes)?;
+        self.state.keyframe = Some((step, bytes));
         self.owner.wake(Wake::Frame);
         Ok(())
     }
 
     /// Publishes the torn constraints, if they have changed.
     fn publish_tears(&mut self) -> anyhow::Result<()> {
-        let Some(torn) = self.position.tears.torn() else { return Ok(()) };
+        let torn = &self.state.torn;
         if *torn == self.published_torn {
             return Ok(());
         }
@@ -247,30 +244,31 @@ impl Replay {
 
     /// Publishes the parameters, if they have changed.
     fn publish_parameters(&mut self, step: u64) -> anyhow::Result<()> {
-        if self.published_parameters != self.position.parameters {
-            self.published_parameters = self.position.parameters.clone();
+        let parameters = self.state.parameters.as_ref().map(|row| &row.values);
+        if let Some(values) = parameters.filter(|values| **values != self.published_parameters) {
+            self.published_parameters = values.clone();
             self.owner.publish_parameters(self.run_id, step, &self.published_parameters)?;
         }
         Ok(())
     }
 
-    fn publish_colliders(&mut self, row: &CollidersRow) -> anyhow::Result<()> {
+    fn publish_colliders(&self, row: &CollidersRow) -> anyhow::Result<()> {
         let header =
             CollidersHeader { run_id: self.run_id, step: row.step, ..CollidersHeader::default() };
         self.owner.publish_colliders(header, &row.states())?;
         Ok(())
     }
 
-    fn header(&self, frame: &Frame) -> SnapshotHeader {
-        let row = &frame.row;
-        let paused = if self.position.is_paused { SnapshotFlags::PAUSED } else { 0 };
+    fn header(&self) -> SnapshotHeader {
+        let row = &self.state.row;
+        let paused = if self.state.is_paused { SnapshotFlags::PAUSED } else { 0 };
         SnapshotHeader {
             contract_version: CONTRACT_VERSION,
             solver_version: self.run.solver_version,
             run_id: self.run_id,
             step: row.step,
             scene_step: row.scene_step,
-            keyframe_step: self.position.keyframe_step,
+            keyframe_step: self.state.keyframe_step(),
             sim_time_ns: self.run.time_of_step_ns(row.step) - self.run.epoch_ns,
             publish_monotonic_ns: monotonic_ns(),
             state_hash: row.state_hash,
@@ -317,7 +315,7 @@ impl Replay {
         step: u64,
         result: Result<(), Reason>,
     ) -> anyhow::Result<()> {
-        let mut outcome = Outcome::new(self.position.outcome_count, step, command, result);
+        let mut outcome = Outcome::new(self.state.row.outcome_count, step, command, result);
         outcome.run_id = self.run_id;
         outcome.flags = OUTCOME_FLAG_CONTROL;
         self.owner.publish_outcome(&outcome)?;
@@ -341,8 +339,8 @@ impl Replay {
             real_time_factor,
             // As for a node without deadlines.
             time_scale: if control.rate.is_finite() { control.rate } else { 1.0 },
-            outcome_count: self.position.outcome_count,
-            rejected_count: self.position.rejected_count,
+            outcome_count: self.state.row.outcome_count,
+            rejected_count: self.state.rejected_count,
             rate_hz: self.run.rate_hz,
             particle_count: self.run.particle_count,
             constraint_count: self.run.constraint_count,
@@ -358,7 +356,7 @@ impl Replay {
             *entry = member;
             status.member_count += 1;
         }
-        if let Some(row) = &self.status {
+        if let Some(row) = &self.state.status {
             status.wake_late_ns_p50 = row.wake_late_ns_p50;
             status.wake_late_ns_p99 = row.wake_late_ns_p99;
             status.solve_ns_p50 = row.solve_ns_p50;

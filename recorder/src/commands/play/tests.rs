@@ -1,12 +1,11 @@
 //! Headers and payloads that a replay publishes equal the recorded ones.
 
 use std::collections::VecDeque;
-use std::sync::Arc;
 use std::time::Duration;
 
 use recording::{
-    CollidersRow, Frame, Message, OutcomeRow, RunDescription, StepRow, SurfaceRow, TapeState,
-    TearsRow, TopologyRow, Up,
+    CollidersRow, Frame, Message, OutcomeRow, RecordedState, RunDescription, StepRow, SurfaceRow,
+    TearsRow, TopologyRow,
 };
 use sim_contract::testing::TestDomain;
 use sim_contract::{
@@ -15,7 +14,6 @@ use sim_contract::{
     Torn, TornConstraint, Triangle,
 };
 
-use super::position::Position;
 use super::replay::{Recorded, Replay};
 
 /// Long enough on any machine.
@@ -27,15 +25,12 @@ fn run() -> RunDescription {
         epoch_ns: 1_000,
         scene_name: "dot".to_owned(),
         origin: [0.5, 0.0, 0.0],
-        up: Up::Y,
         rate_hz: 240,
-        method: 0,
         particle_count: 2,
         constraint_count: 1,
-        bend_count: 0,
         solver_version: 3,
         contract_version: CONTRACT_VERSION,
-        recorder_version: "0".to_owned(),
+        ..RunDescription::default()
     }
 }
 
@@ -62,11 +57,11 @@ fn frame(step: u64, updates: Vec<Message>) -> Frame {
 }
 
 fn replay(domain: &TestDomain) -> Replay {
-    replay_from(domain, Position::new(Torn::default()))
+    replay_from(domain, RecordedState::default())
 }
 
-fn replay_from(domain: &TestDomain, position: Position) -> Replay {
-    replay_after(domain, None, position)
+fn replay_from(domain: &TestDomain, state: RecordedState) -> Replay {
+    replay_after(domain, None, state)
 }
 
 /// Serves late subscribers.
@@ -74,7 +69,7 @@ fn serve(replay: &mut Replay) {
     replay.receive_commands(&mut VecDeque::new());
 }
 
-fn replay_after(domain: &TestDomain, owner: Option<Owner>, position: Position) -> Replay {
+fn replay_after(domain: &TestDomain, owner: Option<Owner>, state: RecordedState) -> Replay {
     let load = LoadHeader::default();
     let recorded = Recorded {
         run: &run(),
@@ -89,7 +84,7 @@ fn replay_after(domain: &TestDomain, owner: Option<Owner>, position: Position) -
         collider_count: 1,
         keyframe_size_bytes_max: 64,
     };
-    Replay::new(&domain.endpoint(), owner, &recorded, position).unwrap()
+    Replay::new(&domain.endpoint(), owner, &recorded, state).unwrap()
 }
 
 /// Returns a client that reads snapshots from now on. Its first read subscribes it.
@@ -193,8 +188,8 @@ fn readers_stay_connected_when_a_run_follows_another() {
     };
     let (run_id, step, torn) = next(&mut first);
     assert_eq!((step, torn), (12, vec![]));
-    let position = Position::new(before(None));
-    let mut second = replay_after(&domain, Some(first.into_owner()), position);
+    let state = RecordedState { torn: before(None), ..RecordedState::default() };
+    let mut second = replay_after(&domain, Some(first.into_owner()), state);
     second.publish_latched().unwrap();
     second.publish(&frame(3, vec![])).unwrap();
     let (second_run_id, step, _) = next(&mut second);
@@ -271,8 +266,9 @@ fn before(cause: Option<TearCause>) -> Torn {
 #[test]
 fn each_list_of_tears_is_complete_and_a_reset_empties_it() {
     let domain = TestDomain::new();
-    let position = Position::new(before(Some(TearCause::Force)));
-    let mut replay = replay_from(&domain, position);
+    let cause = Some(TearCause::Force);
+    let state = RecordedState { torn: before(cause), ..RecordedState::default() };
+    let mut replay = replay_from(&domain, state);
     replay.publish_latched().unwrap();
     let mut client = Client::attach(&domain.endpoint()).unwrap();
     assert_eq!(client.torn(Duration::ZERO).unwrap().constraints, []);
@@ -296,18 +292,11 @@ fn a_replay_that_starts_late_publishes_the_torn_constraints_and_the_colliders() 
     let (cut, distance) = (Some(TearCause::Cut), Some(TearCause::Distance));
     let mut torn: Torn = [TornConstraint::new(1, cut)].into_iter().collect();
     torn.extend(4, [TornConstraint::new(0, distance)]);
+    torn.header.since_step = 2;
     let Message::Colliders(colliders) = floor(3, 2.0) else { unreachable!() };
     let row = StepRow { step: 6, scene_step: 4, outcome_count: 3, ..frame(6, vec![]).row };
-    let state = TapeState {
-        row,
-        has_readable_row: true,
-        particles: Arc::new(frame(6, vec![]).payload().to_vec()),
-        torn,
-        colliders: Some(colliders),
-        parameters: None,
-        status: None,
-    };
-    let mut replay = replay_from(&domain, Position::at(&state, None));
+    let state = RecordedState { row, torn, colliders: Some(colliders), ..RecordedState::default() };
+    let mut replay = replay_from(&domain, state);
     replay.publish_latched().unwrap();
     let mut client = Client::attach(&domain.endpoint()).unwrap();
     let mut offset = |replay: &mut Replay, timeout| {

@@ -110,9 +110,14 @@ pub(crate) struct RecordArgs {
     pub(super) as_json: AsJson,
 }
 
-/// Options of a recording of one step.
+/// Options of `recorder state`, a recording of one step.
 #[derive(Debug, Clone, clap::Args)]
-pub(crate) struct SingleStateArgs {
+#[command(
+    after_help = "A state is a recording of one step. `recorder restore` puts it in place again.\n\nExamples:\n  \
+    recorder state -o state.mcap\n  \
+    recorder restore state.mcap"
+)]
+pub(crate) struct StateArgs {
     #[command(flatten)]
     endpoint: EndpointArgs,
     /// File to write [default: NAME_<UTC time>.mcap]
@@ -128,9 +133,9 @@ pub(crate) struct SingleStateArgs {
     as_json: AsJson,
 }
 
-impl From<SingleStateArgs> for RecordArgs {
-    fn from(args: SingleStateArgs) -> Self {
-        let SingleStateArgs { endpoint, output, timeout, file, as_json } = args;
+impl From<StateArgs> for RecordArgs {
+    fn from(args: StateArgs) -> Self {
+        let StateArgs { endpoint, output, timeout, file, as_json } = args;
         Self {
             endpoint,
             output,

@@ -6,7 +6,7 @@ use std::thread;
 
 use recording::{
     AllCounts, Closing, Compression, FrameReader, GapCounter, LogEnd, LogOptions, LogReader,
-    LogWriter, Message, OutcomeRow, RunDescription, StepRow, Topic, Up,
+    LogWriter, Message, OutcomeRow, RunDescription, StepRow, Topic,
 };
 use sim_contract::{Action, Command, Outcome, ParticleState};
 
@@ -68,18 +68,10 @@ impl Write for StallingFile {
 fn description() -> RunDescription {
     RunDescription {
         run_id: 7,
-        epoch_ns: 0,
         scene_name: "points".to_owned(),
-        origin: [0.0; 3],
-        up: Up::Y,
         rate_hz: 240,
-        method: 0,
         particle_count: 1000,
-        constraint_count: 0,
-        bend_count: 0,
-        solver_version: 1,
-        contract_version: 1,
-        recorder_version: "0".to_owned(),
+        ..RunDescription::default()
     }
 }
 

@@ -52,13 +52,11 @@ pub(super) fn parse_setting(text: &str) -> Result<TimedCommand, String> {
     }
     let commands = parse_commands(&line.to_string(), "--set").map_err(|error| error.to_string())?;
     let command = commands.into_iter().next().ok_or(FORM)?;
-    match command.action {
-        Action::Set { value, .. } if !parameter.info().accepts(value) => {
-            let allowed = parameter.info().allowed_values();
-            Err(format!("{} (allowed: {allowed})", Reason::OutOfRange))
-        }
-        _ => Ok(command),
-    }
+    command
+        .action
+        .validate()
+        .map_err(|reason| format!("{reason} (allowed: {})", parameter.info().allowed_values()))?;
+    Ok(command)
 }
 
 /// The scene, steps, states and commands of a recording.

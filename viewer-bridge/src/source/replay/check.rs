@@ -5,10 +5,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Sender;
 
 use recording::{
-    IndexedLog, LogEnd, LoggedMessage, Message, OutcomeRow, ReadError, StepRow, TearTracker,
-    state_hash,
+    HashSeeds, IndexedLog, LogEnd, LoggedMessage, Message, OutcomeRow, ReadError, StepRow,
 };
-use sim_contract::{ParticleState, Torn};
+use sim_contract::ParticleState;
 use sim_host::clock::{SECOND_NS, monotonic_ns};
 
 use super::marks::Marks;
@@ -32,8 +31,6 @@ pub(super) struct Job {
     pub(super) log: IndexedLog,
     pub(super) first: StepRow,
     pub(super) last_step: u64,
-    /// Constraints that were torn before the recording.
-    pub(super) torn: Torn,
 }
 
 /// Reads to the end, or until it is cancelled.
@@ -58,7 +55,7 @@ pub(super) fn check(mut job: Job, reports: &Sender<Report>, is_cancelled: &Atomi
 #[derive(Debug)]
 struct Check {
     marks: Marks,
-    torn: TearTracker,
+    seeds: HashSeeds,
     row: Option<StepRow>,
     /// A step is late if it began later than this, in ns.
     period_ns: u64,
@@ -75,7 +72,7 @@ impl Check {
         let first_step = job.first.step;
         Self {
             marks: Marks::new(first_step, job.last_step),
-            torn: TearTracker::new(job.torn.clone()),
+            seeds: HashSeeds::default(),
             row: None,
             period_ns: SECOND_NS / u64::from(job.log.run().rate_hz.max(1)),
             equal_count: 0,
@@ -89,7 +86,7 @@ impl Check {
     fn add_chunk(&mut self, read: Result<Vec<LoggedMessage>, ReadError>) {
         let Ok(messages) = read else {
             self.damaged_count += 1;
-            self.torn.mark_gap();
+            self.seeds.mark_gap();
             self.row = None;
             return;
         };
@@ -99,7 +96,7 @@ impl Check {
     }
 
     fn add(&mut self, message: &Message) {
-        self.torn.process(message);
+        self.seeds.process(message);
         match message {
             Message::Tears(row) => {
                 let count = u32::try_from(row.constraints.len()).unwrap_or(u32::MAX);
@@ -125,18 +122,13 @@ impl Check {
 
     fn compare(&mut self, step: u64, particles: &[ParticleState]) {
         let row = self.row.take().filter(|row| row.step == step);
-        let torn: Option<Vec<u32>> = self.torn.torn().map(|torn| torn.indices().collect());
-        let torn = torn.as_deref().zip(row);
-        let torn = torn.and_then(|(torn, row)| torn.get(..row.torn_count as usize));
-        match (row, torn) {
-            (Some(row), Some(torn)) if row.state_hash == state_hash(particles, torn) => {
-                self.equal_count += 1;
-            }
-            (Some(_), Some(_)) => {
+        match row.and_then(|row| self.seeds.is_equal(&row, particles)) {
+            Some(true) => self.equal_count += 1,
+            Some(false) => {
                 self.different_count += 1;
                 self.first_different.get_or_insert(step);
             }
-            _ => self.unknown_count += 1,
+            None => self.unknown_count += 1,
         }
     }
 

@@ -2,7 +2,6 @@
 //!
 //! A thread opens it and finds the first step at which the two differ; the player reads the states on show.
 
-mod comparison;
 mod job;
 
 use std::collections::BTreeSet;
@@ -13,7 +12,7 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::{self, JoinHandle};
 
 use recording::verification::distance;
-use recording::{ReadError, Tape, TapeError, TapeState};
+use recording::{ReadError, RecordedState, Tape, TapeError};
 use sim_contract::{ConstraintState, ParticleState};
 use sim_host::Stop;
 
@@ -184,7 +183,7 @@ impl Ghosts {
     pub(super) fn read(
         &mut self,
         epoch: u32,
-        state: &TapeState,
+        state: &RecordedState,
         constraints: &[ConstraintState],
     ) -> Result<bool, ReadError> {
         let step = state.row.step;
@@ -215,7 +214,11 @@ impl Ghosts {
 }
 
 /// Builds the message with a state of the ghost, without its stamp. It has the particles and constraints of the state on show.
-fn to_ghost(ghost: &TapeState, shown: &TapeState, constraints: &[ConstraintState]) -> Ghost {
+fn to_ghost(
+    ghost: &RecordedState,
+    shown: &RecordedState,
+    constraints: &[ConstraintState],
+) -> Ghost {
     let particles = &ghost.particles;
     let (farthest, distance) = if ghost.row.step == shown.row.step {
         farthest(particles, &shown.particles)
@@ -247,7 +250,7 @@ fn farthest(a: &[ParticleState], b: &[ParticleState]) -> (u32, f32) {
 }
 
 /// Returns the constraints that are torn or have an end without a finite position.
-fn hidden(ghost: &TapeState, constraints: &[ConstraintState]) -> Vec<u32> {
+fn hidden(ghost: &RecordedState, constraints: &[ConstraintState]) -> Vec<u32> {
     let is_known = |index: &u32| (*index as usize) < constraints.len();
     let mut hidden: Vec<u32> = ghost.torn.indices().filter(is_known).collect();
     let particles = &ghost.particles;
@@ -268,18 +271,15 @@ mod tests {
 
     use super::*;
 
-    fn state(step: u64, positions: &[[f32; 3]]) -> TapeState {
+    fn state(step: u64, positions: &[[f32; 3]]) -> RecordedState {
         let particles = positions.iter();
         let particles = particles
             .map(|position| ParticleState { position: *position, ..ParticleState::default() });
-        TapeState {
+        RecordedState {
             row: StepRow { step, ..StepRow::default() },
             has_readable_row: true,
             particles: Arc::new(particles.collect()),
-            torn: sim_contract::Torn::default(),
-            colliders: None,
-            parameters: None,
-            status: None,
+            ..RecordedState::default()
         }
     }
 

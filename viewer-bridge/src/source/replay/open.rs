@@ -5,7 +5,7 @@ use std::io::ErrorKind;
 use std::path::Path;
 
 use anyhow::{Context, anyhow, bail};
-use recording::{LogEnd, ReadError, Tape, TapeError, TapeState};
+use recording::{LogEnd, ReadError, RecordedState, Tape, TapeError};
 use sim_host::Stop;
 
 use crate::scene::load::Load;
@@ -22,7 +22,7 @@ pub(super) struct Recording {
     pub(super) tape: Tape,
     pub(super) load: Load,
     /// The state at the first step.
-    pub(super) first: TapeState,
+    pub(super) first: RecordedState,
     /// Name of the file without its folder, which clients need not know.
     pub(super) file: String,
 }

@@ -3,7 +3,7 @@
 use std::sync::mpsc::Receiver;
 use std::time::Duration;
 
-use recording::{ReadError, TapeError, TapeState};
+use recording::{ReadError, RecordedState, TapeError};
 use sim_contract::{Action, Forces, ForcesHeader, Parameter, ParameterValue, Reason};
 use sim_host::clock::{SECOND_NS, monotonic_ns};
 
@@ -11,8 +11,6 @@ use super::check::Report;
 use super::ghosts::Ghosts;
 use super::open::Recording;
 use super::playhead::{Advanced, Playhead};
-use super::resets::ResetFinder;
-use super::statistics::statistics;
 use super::texts;
 use crate::limits::{FRAMES_PER_SECOND_MAX, REPLAY_RATES};
 use crate::message::{CommandKind, Hashes, Level, OutcomeText, ParametersText, Refusal};
@@ -41,7 +39,7 @@ pub(super) struct Player<'a> {
     shown: ShownState,
     playhead: Playhead,
     /// The state at the place of the playhead.
-    state: TapeState,
+    state: RecordedState,
     /// The step whose forces were read, and those that the recording has of it.
     forces: Option<(u64, Option<Forces>)>,
     resets: ResetFinder,
@@ -291,7 +289,7 @@ impl<'a> Player<'a> {
         Ok(())
     }
 
-    fn set_state(&mut self, state: TapeState) {
+    fn set_state(&mut self, state: RecordedState) {
         let passes_reset = self.resets.passes_reset(state.beginning());
         self.state = state;
         self.publish_changes();
@@ -419,8 +417,51 @@ impl<'a> Player<'a> {
             let values = self.parameters.as_ref().and_then(|text| text.values.as_ref());
             let gravity = values.map_or([0.0; 3], |values| values.vector(Parameter::Gravity));
             let (state, shown, playhead) = (&self.state, &self.shown, &self.playhead);
-            let statistics = statistics(self.recording, state, shown, playhead, gravity);
+            let statistics = texts::statistics(self.recording, state, shown, playhead, gravity);
             self.sinks.publish(&Update::Statistics(&statistics));
         }
+    }
+}
+
+/// Finds recorded resets between the states on show. The beginning of a state is the step at which its
+/// scene was at its beginning; it is `None` if the header is unreadable.
+#[derive(Debug, Clone, Copy)]
+struct ResetFinder {
+    /// Beginning of the last state with a readable header.
+    beginning: Option<u64>,
+}
+
+impl ResetFinder {
+    fn new(beginning: Option<u64>) -> Self {
+        Self { beginning }
+    }
+
+    /// Returns `true` if a reset lies between the state before and this one, in either direction. A
+    /// state without a readable header is skipped, so a reset beside it is found with the next state.
+    fn passes_reset(&mut self, beginning: Option<u64>) -> bool {
+        let before = self.beginning;
+        self.beginning = beginning.or(before);
+        before.is_some() && self.beginning != before
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_reset_is_found_in_either_direction() {
+        let mut resets = ResetFinder::new(Some(0));
+        let passes = [0, 12, 12, 0, 0].map(|beginning| resets.passes_reset(Some(beginning)));
+        assert_eq!(passes, [false, true, false, true, false]);
+    }
+
+    #[test]
+    fn a_state_without_a_readable_header_is_no_reset_and_hides_none() {
+        let mut resets = ResetFinder::new(Some(0));
+        let passes = [None, Some(0), None, Some(13), Some(13)]
+            .map(|beginning| resets.passes_reset(beginning));
+        assert_eq!(passes, [false, false, false, true, false]);
+        assert!(!ResetFinder::new(None).passes_reset(Some(1)));
     }
 }

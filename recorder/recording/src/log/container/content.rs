@@ -82,7 +82,7 @@ impl ContentCheck {
             log_time_ns: 0,
             row: None,
             last_row: None,
-            seeds: HashSeeds::new(),
+            seeds: HashSeeds::default(),
             load: LoadWatch::default(),
             gaps: GapCounter::for_selection(selection),
             counts: AllCounts::default(),

@@ -69,6 +69,22 @@ impl Losses {
         self.more_ranges
     }
 
+    /// Returns the ranges of steps with losses, as text.
+    pub fn steps(&self) -> Vec<String> {
+        let more = (self.more_ranges > 0).then(|| format!("{} more ranges", self.more_ranges));
+        self.ranges.iter().map(ToString::to_string).chain(more).collect()
+    }
+
+    /// Returns what is lost, as lines for people.
+    pub fn lines(&self) -> Vec<String> {
+        let (steps, messages) = (self.steps(), self.messages());
+        let counts: Vec<_> =
+            messages.iter().map(|(topic, count)| format!("{topic} {count}")).collect();
+        let steps = (!steps.is_empty()).then(|| format!("steps {}", steps.join(", ")));
+        let counts = (!counts.is_empty()).then(|| format!("messages: {}", counts.join(", ")));
+        self.head.map(str::to_owned).into_iter().chain(steps).chain(counts).collect()
+    }
+
     /// Returns the number of lost messages by topic, as far as the file tells.
     pub fn messages(&self) -> BTreeMap<&'static str, u64> {
         let counts = self.counts.iter().map(|(topic, counts)| (topic.name(), counts.lost));

@@ -11,7 +11,7 @@ use sim_messages::{
     OutcomeStatus, Reason, RestoreContents,
 };
 
-use super::json::JsonNumber;
+use super::JsonNumber;
 
 /// The outcome of a command: the flat command object with its status. The rows of a recording are a
 /// command file that reproduces it.

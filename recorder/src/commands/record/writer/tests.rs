@@ -1,7 +1,7 @@
 //! A ring of files whose older ones another program moves or blocks.
 
 use clap::Parser;
-use recording::{AllCounts, RunDescription, Up};
+use recording::{AllCounts, RunDescription};
 
 use super::*;
 
@@ -32,18 +32,10 @@ struct Options {
 pub(super) fn header() -> RunHeader {
     let run = RunDescription {
         run_id: 7,
-        epoch_ns: 0,
         scene_name: "points".to_owned(),
-        origin: [0.0; 3],
-        up: Up::Y,
         rate_hz: 240,
-        method: 0,
         particle_count: 1,
-        constraint_count: 0,
-        bend_count: 0,
-        solver_version: 1,
-        contract_version: 1,
-        recorder_version: "0".to_owned(),
+        ..RunDescription::default()
     };
     RunHeader { run, scene: b"version = 1".to_vec(), colliders: Arc::default(), rows: Vec::new() }
 }
