@@ -99,11 +99,11 @@ pub fn complete_state(
 /// If the file cannot be read, or the recording does not lead to the step.
 pub fn state_at_place<R: Read>(
     log: LogReader<R>,
-    place: StatePlace,
+    place: &StatePlace,
     threads: usize,
     stop: &StopFlag,
 ) -> Result<CompleteState, CompleteStateError> {
-    let StatePlace { step, keyframe_step, .. } = place;
+    let StatePlace { step, keyframe_step, .. } = *place;
     let mut first = None;
     let mut frames = FrameReader::new(log);
     while first.as_ref().is_none_or(|frame: &Frame| frame.row.step < keyframe_step) {

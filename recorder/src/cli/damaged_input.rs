@@ -5,10 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow};
 use recording::{FindStateError, IntactParts, LogEnd, ReadError, RepairError};
-use sim_contract::printable_line;
 use sim_host::{Stop, is_being_written};
-
-use super::output;
 
 /// Most lines about the losses of a file.
 const LOSSES_SHOWN_MAX: usize = 10;
@@ -28,9 +25,9 @@ impl DamagedInput {
         &self.end
     }
 
-    /// Prints what the recording has lost.
-    pub(crate) fn note_losses(&self) {
-        note_losses(&self.path, &self.end, &Stop::default());
+    /// Returns what the recording has lost, as lines.
+    pub(crate) fn losses(&self) -> Vec<String> {
+        losses(&self.path, &self.end, &Stop::default())
     }
 }
 
@@ -82,27 +79,18 @@ pub(crate) fn intact_parts(
     }
 }
 
-/// Prints what a recording has lost behind the end of its readable part, as `recorder check` and `recorder repair`
-/// name it.
-pub(crate) fn note_losses(path: &Path, end: &LogEnd, stop: &Stop) {
+/// Returns what a recording has lost behind the end of its readable part, as `recorder check` and `recorder repair` name
+/// it, as lines.
+pub(crate) fn losses(path: &Path, end: &LogEnd, stop: &Stop) -> Vec<String> {
     if *end == LogEnd::Complete || is_being_written(path) {
-        return;
+        return Vec::new();
     }
-    let Ok(parts) = IntactParts::find(path, stop) else { return };
-    let lines = parts.losses();
-    for line in lines.iter().take(LOSSES_SHOWN_MAX) {
-        output::note(&printable_line(&format!("  {line}")));
-    }
+    let mut lines = IntactParts::find(path, stop).map_or_else(|_| Vec::new(), |one| one.losses());
     if let Some(more) = lines.len().checked_sub(LOSSES_SHOWN_MAX).filter(|more| *more > 0) {
-        output::note(&format!("  {more} more; `recorder check {}` lists them", path.display()));
+        lines.truncate(LOSSES_SHOWN_MAX);
+        lines.push(format!("{more} more; `recorder check {}` lists them", path.display()));
     }
-}
-
-/// Warns about a recording without its end: where the end of its readable part is, and what is lost. `done` is the work that was
-/// done with the readable part.
-pub(crate) fn warn_of_losses(path: &Path, end: &LogEnd, done: &str, stop: &Stop) {
-    output::warn_incomplete(path, end, done);
-    note_losses(path, end, stop);
+    lines
 }
 
 /// Returns the error of a recording without the state that a subcommand looks for.

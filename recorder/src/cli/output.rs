@@ -10,9 +10,9 @@ use indicatif::{ProgressBar, ProgressStyle};
 use recording::LogEnd;
 use serde::Serialize;
 use sim_contract::{printable, printable_line};
-use sim_host::{console, is_being_written};
+use sim_host::{Stop, console, is_being_written};
 
-use super::damaged_input::DamagedInput;
+use super::damaged_input::{DamagedInput, losses};
 
 /// The option that selects the format of a result.
 #[derive(Debug, Clone, Copy, clap::Args)]
@@ -65,6 +65,22 @@ pub(crate) fn warn_incomplete(path: &Path, end: &LogEnd, done: &str) {
             "warning: {text} is {end}; {done}. `recorder repair {text} OUT.mcap` copies what is intact"
         ));
     }
+}
+
+/// Warns about a recording without its end: where the end of its readable part is, and what is lost. `done` is the work that
+/// was done with the readable part.
+pub(crate) fn warn_of_losses(path: &Path, end: &LogEnd, done: &str, stop: &Stop) {
+    warn_incomplete(path, end, done);
+    note_losses(path, end, stop);
+}
+
+/// Prints what a recording has lost, on stderr.
+pub(crate) fn note_losses(path: &Path, end: &LogEnd, stop: &Stop) {
+    note_lines(&losses(path, end, stop));
+}
+
+fn note_lines(lines: &[String]) {
+    lines.iter().for_each(|line| note(&format!("  {}", printable_line(line))));
 }
 
 /// Warns about a file that has another extension than its format, because other programs, and
@@ -167,7 +183,7 @@ pub(crate) fn from_result(result: anyhow::Result<Exit>) -> Exit {
     result.unwrap_or_else(|error| {
         console::note(&format!("error: {error:#}"));
         let Some(damaged) = error.downcast_ref::<DamagedInput>() else { return Exit::Failed };
-        damaged.note_losses();
+        note_lines(&damaged.losses());
         Exit::Loss
     })
 }

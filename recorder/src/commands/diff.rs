@@ -13,7 +13,7 @@ use serde_json::Value;
 use sim_contract::{Action, ParticleState};
 use sim_host::Stop;
 
-use crate::cli::damaged_input::{lacks, warn_of_losses};
+use crate::cli::damaged_input::lacks;
 use crate::cli::output::{self, AsJson, Exit, progress_spinner};
 use report::{CommandDifference, DiffReport, Distance, Growth, SceneDifference, StateDifference};
 
@@ -60,7 +60,7 @@ pub(crate) fn run(args: &DiffArgs) -> anyhow::Result<Exit> {
     let mut is_complete = true;
     for (path, end) in paths.into_iter().zip(ends) {
         if end != LogEnd::Complete {
-            warn_of_losses(path, &end, "compared as far as it goes", &stop);
+            output::warn_of_losses(path, &end, "compared as far as it goes", &stop);
             is_complete = false;
         }
     }

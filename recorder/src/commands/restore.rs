@@ -12,7 +12,7 @@ use sim_contract::{Action, Client, GivenState, Outcome, scene_hash};
 use sim_host::{Stop, report_bus_errors};
 
 use crate::cli::args::{EndpointArgs, ThreadArgs};
-use crate::cli::damaged_input::{lacks, lacks_state, warn_of_losses};
+use crate::cli::damaged_input::{lacks, lacks_state};
 use crate::cli::output::{self, AsJson, Exit, path_text};
 use crate::cli::parse::{self, whole_number};
 
@@ -88,20 +88,18 @@ pub(crate) fn run(args: &RestoreArgs) -> anyhow::Result<Exit> {
     });
     let place = place.with_context(|| path.clone())?;
     let log = LogReader::open_until(&args.file, &stop).with_context(|| path.clone())?;
-    let (step, end) = (place.step, place.end.clone());
-    let state = state_at_place(log, place, args.threads.count(), &stop).context(path)?;
+    let state = state_at_place(log, &place, args.threads.count(), &stop).context(path)?;
     let given = GivenState {
         scene_hash: state.scene_hash,
         particles: &state.particles,
         keyframe: Some(&state.keyframe),
     };
     let outcome = client.restore(&given, args.timeout)?;
-    let report = check_outcome(&outcome, step, state.state_hash)?;
+    let report = check_outcome(&outcome, place.step, state.state_hash)?;
     output::result(args.as_json, &report, &report.to_string())?;
-    if let Some(end) = end.filter(|end| *end != LogEnd::Complete) {
-        let done =
-            format!("restored step {step}, the last one that was asked for in its readable part");
-        warn_of_losses(&args.file, &end, &done, &stop);
+    if let Some(end) = place.end.filter(|end| *end != LogEnd::Complete) {
+        let done = format!("restored step {}, the last one of its readable part", place.step);
+        output::warn_of_losses(&args.file, &end, &done, &stop);
     }
     Ok(Exit::Done)
 }

@@ -22,12 +22,11 @@ use sim_host::{Stop, part_path};
 use sim_solver::{Scene, Solver};
 
 use crate::cli::args::{FileArgs, LogFile, ThreadArgs};
-use crate::cli::damaged_input::warn_of_losses;
 use crate::cli::output::{self, AsJson, Exit, progress_bar, progress_spinner, with_usage};
 use crate::cli::parse::whole_number;
 use crate::input::{CommandSource, is_recording, load_scene};
 use changes::{Changed, Changes, ChangesSurvey, parse_setting};
-use completion::Completion;
+use completion::{Completed, Completion};
 
 /// Steps between two updates of the progress bar.
 const STEPS_PER_UPDATE: u64 = 256;
@@ -145,18 +144,10 @@ fn run_recording(args: &SimulateArgs, stop: &Stop) -> anyhow::Result<Exit> {
     bar.finish_and_clear();
     let output = file.map(PartFile::finish).transpose()?;
     let wall_ns = monotonic_ns() - before_ns;
-    let simulated = Simulated {
-        scene: &completed.scene,
-        first_step: completed.first_step,
-        last_step: completed.last_step,
-        state_hash: completed.state_hash,
-        applied_count: completed.applied_count,
-        rejected_count: completed.rejected_count,
-    };
-    let summary = simulated.summary(wall_ns, output.as_deref());
-    output::result(args.as_json, &summary, &summary.to_string())?;
+    let Completed { scene, first_step, result, .. } = &completed;
+    Simulated { scene, first_step: *first_step, result }.print(args, wall_ns, output.as_deref())?;
     if completed.end != LogEnd::Complete {
-        warn_of_losses(path, &completed.end, "simulated as far as it goes", stop);
+        output::warn_of_losses(path, &completed.end, "simulated as far as it goes", stop);
     }
     let is_complete = completed.end == LogEnd::Complete && !completed.is_interrupted;
     Ok(if is_complete { Exit::Done } else { Exit::Loss })
@@ -179,7 +170,7 @@ fn run_changed(args: &SimulateArgs, stop: &Stop) -> anyhow::Result<Exit> {
     if end == LogEnd::Complete {
         return Ok(exit);
     }
-    warn_of_losses(path, &end, "simulated as far as it goes", stop);
+    output::warn_of_losses(path, &end, "simulated as far as it goes", stop);
     Ok(Exit::Loss)
 }
 
@@ -225,16 +216,8 @@ fn run_job<E: From<WriteError> + Into<anyhow::Error>>(
 
     note_rejections(&result, &counts);
     note_incomplete_contacts(&result);
-    let simulated = Simulated {
-        scene: &job.scene,
-        first_step,
-        last_step: result.steps,
-        state_hash: result.state_hash,
-        applied_count: result.applied_count,
-        rejected_count: result.rejected_count,
-    };
-    let summary = simulated.summary(wall_ns, path.as_deref());
-    output::result(args.as_json, &summary, &summary.to_string())?;
+    let simulated = Simulated { scene: &job.scene, first_step, result: &result };
+    simulated.print(args, wall_ns, path.as_deref())?;
     Ok(if result.steps < job.steps { Exit::Loss } else { Exit::Done })
 }
 
@@ -395,28 +378,27 @@ fn missing_condition(action: &Action) -> Option<&'static str> {
 struct Simulated<'a> {
     scene: &'a Scene,
     first_step: u64,
-    last_step: u64,
-    state_hash: u64,
-    applied_count: u64,
-    rejected_count: u64,
+    result: &'a SimulationResult,
 }
 
 impl Simulated<'_> {
-    fn summary(&self, wall_ns: u64, path: Option<&Path>) -> Summary {
+    /// Prints the summary.
+    fn print(&self, args: &SimulateArgs, wall_ns: u64, path: Option<&Path>) -> anyhow::Result<()> {
         let wall_s = wall_ns.max(1) as f64 / SECOND_NS as f64;
-        let steps = self.last_step - self.first_step;
+        let steps = self.result.steps - self.first_step;
         let simulated_s = steps as f64 / f64::from(self.scene.solver.rate_hz);
-        Summary {
+        let summary = Summary {
             scene: self.scene.name.clone(),
             first_step: self.first_step,
             steps,
-            state_hash: format!("{:016x}", self.state_hash),
-            applied: self.applied_count,
-            rejected: self.rejected_count,
+            state_hash: format!("{:016x}", self.result.state_hash),
+            applied: self.result.applied_count,
+            rejected: self.result.rejected_count,
             real_time_factor: simulated_s / wall_s,
             wall_s,
             output: path.map(output::path_text),
-        }
+        };
+        output::result(args.as_json, &summary, &summary.to_string())
     }
 }
 

@@ -10,10 +10,9 @@ use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use recording::{
-    LogReader, Message, ReadError, RecordedState, RunDescription, SceneState, SceneStateError,
-    StepRow, Tape, TapeError, complete_state,
+    LogReader, Message, ReadError, RunDescription, SceneState, SceneStateError, StepRow, Tape,
+    TapeError, complete_state,
 };
-use sim_contract::SnapshotHeader;
 use sim_solver::Scene;
 
 use crate::arguments;
@@ -106,28 +105,6 @@ impl Recording {
     }
 }
 
-/// Returns the header of a recorded snapshot.
-fn header(run: &RunDescription, state: &RecordedState) -> SnapshotHeader {
-    let row = &state.row;
-    SnapshotHeader {
-        contract_version: run.contract_version,
-        solver_version: run.solver_version,
-        run_id: run.run_id,
-        step: row.step,
-        scene_step: row.scene_step,
-        sim_time_ns: RunDescription::duration_ns(row.step, run.rate_hz),
-        state_hash: row.state_hash,
-        outcome_count: row.outcome_count,
-        wake_late_ns: row.wake_late_ns,
-        solve_ns: row.solve_ns,
-        topology_revision: row.topology_revision,
-        torn_count: row.torn_count,
-        particle_count: run.particle_count,
-        snapshot_index: row.snapshot_index,
-        ..SnapshotHeader::default()
-    }
-}
-
 #[pymethods]
 impl Recording {
     #[new]
@@ -216,7 +193,7 @@ impl Recording {
     ) -> PyResult<Snapshot> {
         let (header, particles) = this.get().read(py, |tape| {
             let state = tape.state_at(step)?;
-            Ok::<_, TapeError>((header(tape.run(), &state), state.particles))
+            Ok::<_, TapeError>((tape.run().snapshot_header(&state.row), state.particles))
         })?;
         let recording = this.clone().unbind();
         let read_forces = move |py: Python<'_>, step| recording.get().forces(py, step);

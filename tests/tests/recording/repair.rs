@@ -122,6 +122,40 @@ fn the_file_of_a_killed_recorder_is_repaired_and_that_of_a_running_one_is_being_
 }
 
 #[test]
+fn programs_that_read_up_to_the_damage_name_what_is_lost_and_where() {
+    let sandbox = Sandbox::new();
+    let [whole, damaged, output] =
+        ["whole", "damaged", "output"].map(|name| sandbox.path(&format!("{name}.mcap")));
+    let args = ["simulate", "curtain", "--steps", "1200", "--compression", "none", "-o", &whole];
+    recorder(&sandbox, &args).success();
+    let mut bytes = fs::read(&whole).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    fs::write(&damaged, &bytes).unwrap();
+    let report = recorder(&sandbox, &["repair", &damaged, &output]);
+    let missing = report.stdout.lines().filter_map(|line| line.strip_prefix("missing     "));
+    let missing: Vec<_> = missing.map(|what| format!("  missing: {what}")).collect();
+    assert!(missing[0].starts_with("  missing: steps "), "{}", report.stdout);
+    let check = recorder(&sandbox, &["check", &damaged]);
+    let place = check.stdout.lines().find(|line| line.starts_with("  byte ")).unwrap().to_owned();
+    let node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain", "--paused"]);
+    let restored = recorder(&sandbox, &["restore", &damaged]);
+    drop(node);
+    let overwritten = ["simulate", &damaged, "-o", &output, "--overwrite"];
+    let played = ["play", &damaged, "--rate", "max"];
+    let ends = [&["diff", &whole, &damaged][..], &overwritten, &played].map(|args| {
+        let read = recorder(&sandbox, args);
+        assert_eq!(read.code, Some(3), "{args:?} {read:?}");
+        read
+    });
+    for read in [restored].into_iter().chain(ends) {
+        for line in missing.iter().chain([&place]) {
+            assert!(read.stderr.lines().any(|one| one == line), "{line}: {}", read.stderr);
+        }
+    }
+}
+
+#[test]
 fn programs_that_need_the_first_chunk_name_the_repair_of_a_file_that_has_lost_it() {
     let sandbox = Sandbox::new();
     let [whole, damaged, output] =

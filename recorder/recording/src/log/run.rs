@@ -6,10 +6,10 @@ use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::str::FromStr;
 
-use sim_messages::{ELEMENTS_MAX, LoadHeader};
+use sim_messages::{ELEMENTS_MAX, LoadHeader, SnapshotHeader};
 use sim_solver::scene::Up;
 
-use super::rows::TopologyRow;
+use super::rows::{StepRow, TopologyRow};
 use super::topic::{AllCounts, Topic, TopicCounts};
 
 /// Version of the topics, rows and metadata in a file.
@@ -101,6 +101,27 @@ impl RunDescription {
             rate_hz: self.rate_hz,
             method: self.method,
             ..LoadHeader::default()
+        }
+    }
+
+    /// Returns the header of a snapshot of this run, as far as its row tells.
+    pub fn snapshot_header(&self, row: &StepRow) -> SnapshotHeader {
+        SnapshotHeader {
+            contract_version: self.contract_version,
+            solver_version: self.solver_version,
+            run_id: self.run_id,
+            step: row.step,
+            scene_step: row.scene_step,
+            sim_time_ns: Self::duration_ns(row.step, self.rate_hz),
+            state_hash: row.state_hash,
+            outcome_count: row.outcome_count,
+            wake_late_ns: row.wake_late_ns,
+            solve_ns: row.solve_ns,
+            topology_revision: row.topology_revision,
+            torn_count: row.torn_count,
+            particle_count: self.particle_count,
+            snapshot_index: row.snapshot_index,
+            ..SnapshotHeader::default()
         }
     }
 

@@ -135,10 +135,44 @@ fn torn_before_first(topology: &TopologyRow, first: &Frame) -> Torn {
 
 #[cfg(test)]
 mod tests {
-    use sim_messages::{LoadHeader, TearCause, TornConstraint};
+    use sim_messages::{Command, LoadHeader, Outcome, TearCause, TearsHeader, TornConstraint};
     use sim_solver::{Scene, Solver, builtin};
 
     use super::*;
+    use crate::log::rows::TearsRow;
+
+    fn tears(step: u64, constraints: &[u32]) -> Message {
+        let causes = vec!["cut".to_owned(); constraints.len()];
+        Message::Tears(TearsRow { step, constraints: constraints.to_vec(), causes })
+    }
+
+    fn torn(state: &RecordedState) -> Vec<u32> {
+        state.torn.indices().collect()
+    }
+
+    #[test]
+    fn tears_are_added_to_those_before_the_file() {
+        let torn_before = [TornConstraint::new(9, None)].into_iter().collect();
+        let mut state = RecordedState { torn: torn_before, ..RecordedState::default() };
+        state.apply(&tears(4, &[1, 2]));
+        assert_eq!(torn(&state), [9, 1, 2]);
+        state.apply(&tears(6, &[3]));
+        let causes: Vec<_> = state.torn.constraints.iter().map(TornConstraint::cause).collect();
+        assert_eq!(causes[..2], [None, Some(TearCause::Cut)]);
+        let expected = TearsHeader { run_id: 0, step: 6, since_step: 0, new_count: 1, count: 4 };
+        assert_eq!(state.torn.header, expected);
+    }
+
+    #[test]
+    fn tears_in_the_step_of_a_reset_follow_the_reset() {
+        let mut state = RecordedState::default();
+        state.apply(&tears(2, &[5]));
+        assert_eq!(torn(&state), [5]);
+        let reset = Outcome::new(0, 8, Command::new(1, 0, Action::Reset), Ok(()));
+        state.apply(&Message::Outcome(OutcomeRow::from(&reset)));
+        state.apply(&tears(8, &[7]));
+        assert_eq!((torn(&state), state.torn.header.since_step), (vec![7], 8));
+    }
 
     #[test]
     fn the_first_keyframe_has_the_causes_of_earlier_tears() {

@@ -15,7 +15,7 @@ use super::rows::{ForcesRow, StepRow, SurfaceRow, TopologyRow};
 use super::run::RunDescription;
 use super::source::FileSource;
 use super::state::RecordedState;
-use super::tears::{TearChange, TearTracker};
+use super::tears::TearChange;
 use super::topic::Topic;
 use chunk_reader::ChunkReader;
 use search::{RecordedSteps, SnapshotPosition, find, first_and_last};
@@ -265,17 +265,17 @@ impl Tape {
     /// tears since.
     fn torn_at(&mut self, chunk: usize, step: u64) -> Result<Torn, ReadError> {
         let base = self.torn_base(chunk, step)?;
-        let mut tracker = TearTracker::new(base.torn);
+        let mut torn = base.torn;
         let changes = self.reader.chunks.with_tear_changes().forward_from(base.chunk);
         for chunk in changes.take_while(|one| *one <= chunk) {
             let later = |one: &&TearChange| base.step.is_none_or(|step| one.step() > step);
             for change in self.reader.digest(chunk)?.changes.iter().filter(later) {
                 if change.step() <= step {
-                    tracker.add(change);
+                    change.apply(&mut torn);
                 }
             }
         }
-        Ok(tracker.torn().cloned().unwrap_or_default())
+        Ok(torn)
     }
 
     /// Returns the torn constraints to start from: the list in the newest keyframe, or the constraints

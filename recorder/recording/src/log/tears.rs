@@ -17,13 +17,6 @@ pub(crate) enum TearChange {
     Tears(TearsRow),
 }
 
-/// The torn constraints after the messages so far.
-#[derive(Debug, Clone)]
-pub(crate) struct TearTracker {
-    torn: Torn,
-    is_known: bool,
-}
-
 /// Returns the torn constraints in a keyframe, or `None` if it is damaged or has another version.
 pub(crate) fn torn_in_keyframe(bytes: &[u8]) -> Option<Torn> {
     let keyframe = Keyframe::decode(bytes).ok()?;
@@ -47,43 +40,12 @@ impl TearChange {
             Self::Tears(row) => row.step,
         }
     }
-}
 
-impl TearTracker {
-    /// Starts with the torn constraints of a state, or with those before a file.
-    pub(crate) fn new(torn: Torn) -> Self {
-        Self { torn, is_known: true }
-    }
-
-    /// Processes the next message of the file. Most messages do not concern tears.
-    pub(crate) fn process(&mut self, message: &Message) {
-        if let Some(change) = TearChange::from_message(message) {
-            self.add(&change);
+    pub(crate) fn apply(&self, torn: &mut Torn) {
+        match self {
+            Self::Reset(step) => torn.reset(*step),
+            Self::Tears(row) => torn.extend(row.step, row.torn()),
         }
-        if !self.is_known
-            && let Message::Keyframe { bytes, .. } = message
-            && let Some(torn) = torn_in_keyframe(bytes)
-        {
-            (self.torn, self.is_known) = (torn, true);
-        }
-    }
-
-    pub(crate) fn add(&mut self, change: &TearChange) {
-        match change {
-            TearChange::Reset(step) => self.torn.reset(*step),
-            TearChange::Tears(row) => self.torn.extend(row.step, row.torn()),
-        }
-    }
-
-    /// Marks a part of the file as unreadable. The torn constraints are unknown until the next
-    /// keyframe.
-    pub(crate) fn mark_gap(&mut self) {
-        self.is_known = false;
-    }
-
-    /// Returns the torn constraints, or `None` if they are unknown.
-    pub(crate) fn torn(&self) -> Option<&Torn> {
-        self.is_known.then_some(&self.torn)
     }
 }
 
@@ -108,9 +70,11 @@ pub(in crate::log) fn hash_bytes(particles: &[u8], seed: u64) -> u64 {
 }
 
 /// The seed of the hash of each snapshot, from the messages before it.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct HashSeeds {
-    tracker: TearTracker,
+    torn: Torn,
+    /// A part of the file is missing since the last keyframe.
+    is_unknown: bool,
     /// `step` minus `scene_step` of the newest snapshot: it changes when a state is put in place.
     beginning: Option<u64>,
     /// The newest step in which a recorded command put a state in place.
@@ -126,30 +90,25 @@ struct TornKey {
     count: u32,
 }
 
-impl Default for HashSeeds {
-    fn default() -> Self {
-        let tracker = TearTracker::new(Torn::default());
-        Self { tracker, beginning: None, replacement_step: None, newest: None }
-    }
-}
-
 impl HashSeeds {
-    /// Processes a message between snapshots.
+    /// Processes a message between snapshots. Most messages do not concern tears.
     pub fn process(&mut self, message: &Message) {
         self.replacement_step = message.replacement_step().max(self.replacement_step);
-        if let Message::Topology(row) = message
-            && self.beginning.is_none()
-        {
-            self.tracker = TearTracker::new(row.torn_before());
-            self.newest = None;
+        let known = match message {
+            Message::Topology(row) if self.beginning.is_none() => Some(row.torn_before()),
+            Message::Keyframe { bytes, .. } if self.is_unknown => torn_in_keyframe(bytes),
+            _ => None,
+        };
+        if let Some(torn) = known {
+            (self.torn, self.is_unknown, self.newest) = (torn, false, None);
+        } else if let Some(change) = TearChange::from_message(message) {
+            change.apply(&mut self.torn);
         }
-        self.tracker.process(message);
     }
 
-    /// Marks a part of the file as missing.
+    /// Marks a part of the file as missing. The torn constraints are unknown until the next keyframe.
     pub fn mark_gap(&mut self) {
-        self.tracker.mark_gap();
-        self.newest = None;
+        (self.is_unknown, self.newest) = (true, None);
     }
 
     /// Compares a snapshot with the hash in its header. Returns `None` if its torn constraints are unknown.
@@ -170,10 +129,11 @@ impl HashSeeds {
         if row.torn_count == 0 {
             return Some(hash_seed(Vec::new()));
         }
-        let torn = self.tracker.torn()?;
-        let count = usize::try_from(row.torn_count).unwrap_or(usize::MAX);
-        let first = torn.constraints.get(..count)?;
-        let key = TornKey { since_step: torn.header.since_step, count: row.torn_count };
+        if self.is_unknown {
+            return None;
+        }
+        let first = self.torn.constraints.get(..row.torn_count as usize)?;
+        let key = TornKey { since_step: self.torn.header.since_step, count: row.torn_count };
         if let Some((newest, seed)) = self.newest
             && newest == key
         {
@@ -187,67 +147,21 @@ impl HashSeeds {
 
 #[cfg(test)]
 mod tests {
-    use sim_messages::{Action, Command, Outcome, TearCause, TearsHeader};
-
-    use super::*;
-    use crate::log::rows::OutcomeRow;
-
-    fn tears(step: u64, constraints: &[u32]) -> Message {
-        let causes = vec!["cut".to_owned(); constraints.len()];
-        Message::Tears(TearsRow { step, constraints: constraints.to_vec(), causes })
-    }
-
-    fn reset(step: u64) -> Message {
-        let command = Command::new(1, 0, Action::Reset);
-        Message::Outcome(OutcomeRow::from(&Outcome::new(0, step, command, Ok(()))))
-    }
-
-    fn before(torn: &[u32]) -> Torn {
-        torn.iter().map(|index| TornConstraint::new(*index, None)).collect()
-    }
-
-    fn torn(tracker: &TearTracker) -> Vec<u32> {
-        tracker.torn().unwrap().indices().collect()
-    }
-
-    #[test]
-    fn tears_are_added_to_those_before_the_file() {
-        let mut tracker = TearTracker::new(before(&[9]));
-        tracker.process(&tears(4, &[1, 2]));
-        assert_eq!(torn(&tracker), [9, 1, 2]);
-        tracker.process(&tears(6, &[3]));
-        let torn = tracker.torn().unwrap();
-        let causes: Vec<_> = torn.constraints.iter().map(TornConstraint::cause).collect();
-        assert_eq!(causes[..2], [None, Some(TearCause::Cut)]);
-        let expected = TearsHeader { run_id: 0, step: 6, since_step: 0, new_count: 1, count: 4 };
-        assert_eq!(torn.header, expected);
-    }
-
-    #[test]
-    fn tears_in_the_step_of_a_reset_follow_the_reset() {
-        let mut tracker = TearTracker::new(Torn::default());
-        tracker.process(&tears(2, &[5]));
-        assert_eq!(torn(&tracker), [5]);
-        tracker.process(&reset(8));
-        tracker.process(&tears(8, &[7]));
-        assert_eq!(torn(&tracker), [7]);
-        assert_eq!(tracker.torn().unwrap().header.since_step, 8);
-    }
-
-    #[test]
-    fn after_a_gap_the_torn_constraints_are_unknown() {
-        let mut tracker = TearTracker::new(Torn::default());
-        tracker.mark_gap();
-        tracker.process(&Message::Keyframe { step: 3, bytes: vec![1, 2, 3] });
-        assert_eq!(tracker.torn(), None);
-    }
-}
-
-#[cfg(test)]
-mod state_hash_tests {
     use sim_solver::{Scene, Solver};
 
     use super::*;
+
+    #[test]
+    fn after_a_gap_the_torn_constraints_are_unknown() {
+        let mut seeds = HashSeeds::default();
+        let row = StepRow { step: 4, torn_count: 1, ..StepRow::default() };
+        let tears = TearsRow { step: 2, constraints: vec![7], causes: vec!["cut".to_owned()] };
+        seeds.process(&Message::Tears(tears));
+        assert_eq!(seeds.seed(&row), Some(hash_seed(vec![7])));
+        seeds.mark_gap();
+        seeds.process(&Message::Keyframe { step: 3, bytes: vec![1, 2, 3] });
+        assert_eq!(seeds.seed(&row), None);
+    }
 
     #[test]
     fn the_hash_equals_the_solvers_hash_with_and_without_torn_constraints() {

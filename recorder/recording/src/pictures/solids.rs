@@ -187,7 +187,7 @@ mod tests {
     use sim_solver::scene::Up;
 
     use super::*;
-    use crate::log::{ColliderDetails, ColliderRow, CollidersRow};
+    use crate::log::{ColliderDetails, ColliderRow, CollidersRow, RecordedState};
     use crate::pictures::{Basis, Size, View};
 
     const ROOM: Extent = Extent { min: DVec3::NEG_ONE, max: DVec3::ONE };
@@ -282,8 +282,9 @@ mod tests {
             details: ColliderDetails::default(),
         };
         let colliders = [near, cube(), bounds, plane_at([0.0, 1.0, 0.0], 0.0)].map(collider);
-        let mut state = SceneState::default();
-        state.colliders = Some(CollidersRow { step: 0, colliders: colliders.into() });
+        let colliders = Some(CollidersRow { step: 0, colliders: colliders.into() });
+        let recorded = RecordedState { colliders, ..RecordedState::default() };
+        let state = SceneState { recorded, ..SceneState::default() };
         let drawn = shapes(&state, &camera(View::Front), &ROOM);
         assert_eq!(drawn.len(), 1 + EDGES.len() + 1 + 1);
         assert!(matches!(drawn[0], Shape::Polygon { fill: PLANE_FILL, .. }));

@@ -131,7 +131,7 @@ pub fn apply(solver: &mut Solver, client_id: u64, action: &Action) -> Result<App
 }
 
 /// The result of a simulation.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct SimulationResult {
     /// Index in `/outcomes` of the first command of the simulation.
     first_index: u64,

@@ -14,7 +14,7 @@ use sim_contract::printable_line;
 use super::timing::{Timing, TimingCollector};
 
 /// The content of a recording, as printed.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Default, Serialize)]
 pub(crate) struct Info {
     pub(super) file: String,
     pub(super) size_bytes: u64,
@@ -66,7 +66,6 @@ impl Info {
         Self {
             file,
             size_bytes,
-            file_end: String::new(),
             scene: run.scene_name.clone(),
             particle_count: run.particle_count,
             constraint_count: run.constraint_count,
@@ -78,19 +77,7 @@ impl Info {
             contract_version: run.contract_version,
             recorder_version: run.recorder_version.clone(),
             simulated: run.epoch_ns == 0,
-            first_step: None,
-            last_step: None,
-            snapshot_count: 0,
-            duration_s: 0.0,
-            wall_clock_s: None,
-            messages: BTreeMap::new(),
-            messages_per_s: BTreeMap::new(),
-            lost: BTreeMap::new(),
-            torn_count_first: None,
-            torn_count_last: None,
-            last_state_hash: None,
-            timing: None,
-            stop_reason: None,
+            ..Self::default()
         }
     }
 

@@ -10,7 +10,6 @@ use sim_host::clock::SECOND_NS;
 
 use super::recording::{Recording, Start};
 use super::replay::Recorded;
-use crate::cli::damaged_input::note_losses;
 use crate::cli::output;
 
 /// A recorded step of a file.
@@ -170,7 +169,7 @@ impl Playlist {
     /// Prints what the files that have ended have lost. Returns `true` if every one was complete.
     pub(super) fn note_losses(&self) -> bool {
         for (file, end) in &self.incomplete {
-            note_losses(&self.files[*file].path, end, &self.stop);
+            output::note_losses(&self.files[*file].path, end, &self.stop);
         }
         self.incomplete.is_empty()
     }

@@ -6,9 +6,9 @@ use std::sync::Arc;
 
 use anyhow::Context;
 use recording::{
-    CollidersRow, CompleteStateError, ContentSelection, FileSource, Frame, FrameReader, LogEnd,
-    LogReader, Message, RecordedSceneError, RecordedState, RunDescription, StepRow, Tape,
-    complete_state, counted, open_recording, recorded_scene,
+    CompleteStateError, ContentSelection, FileSource, Frame, FrameReader, LogEnd, LogReader,
+    Message, RecordedSceneError, RecordedState, RunDescription, StepRow, Tape, complete_state,
+    counted, open_recording, recorded_scene,
 };
 use sim_contract::BendState;
 use sim_host::Stop;
@@ -24,8 +24,6 @@ pub(super) struct Recording {
     path: PathBuf,
     frames: FrameReader<FileSource>,
     tape: Tape,
-    /// Number of colliders in the first snapshot. `None` if the file has none before it.
-    collider_count: Option<usize>,
     /// `None` until a load is published.
     needs: Option<Needs>,
     /// The header of the last snapshot that was read.
@@ -84,15 +82,13 @@ impl Recording {
         log.selection().require_all_particles("`recorder play`")?;
         // Names the problem of a file whose readable part has no snapshot.
         let mut frames = FrameReader::new(log);
-        let first = next_frame(path, &mut frames)?;
-        let collider_count = first_colliders(&first).map(|row| row.colliders.len());
+        next_frame(path, &mut frames)?;
         let tape = Tape::of_file(file, Some(stop), &mut |_, _| {})?;
         tape.rewind(&mut frames);
         Ok(Self {
             path: path.to_owned(),
             frames,
             tape,
-            collider_count,
             needs: None,
             last_row: None,
             has_named_gap: false,
@@ -142,7 +138,7 @@ impl Recording {
         let solver = Solver::new(&recorded_scene(self.frames.log())?);
         let bends = self.tape.topology().bends();
         Ok(Needs {
-            collider_count: self.collider_count.unwrap_or_else(|| solver.collider_count()),
+            collider_count: solver.collider_count(),
             keyframe_size_bytes_max: solver.keyframe_size_bytes_max(),
             bends: bends.context("the columns of the bends in /topology differ in length")?,
         })
@@ -185,7 +181,7 @@ impl Recording {
         let frame = Frame {
             updates: Vec::new(),
             row: state.row,
-            particles: Some(state.particles.to_vec()),
+            particles: Some(Arc::unwrap_or_clone(std::mem::take(&mut state.particles))),
             log_times_ns: Vec::new(),
         };
         Ok(Start { frame, state })
@@ -247,13 +243,6 @@ fn agree(one: &RecordedState, two: &RecordedState) -> bool {
 fn next_frame(path: &Path, frames: &mut FrameReader<FileSource>) -> anyhow::Result<Frame> {
     let frame = frames.next_frame()?;
     frame.ok_or_else(|| lacks(path, "has no snapshot to play", frames.end()))
-}
-
-fn first_colliders(first: &Frame) -> Option<&CollidersRow> {
-    first.updates.iter().find_map(|update| match update {
-        Message::Colliders(row) => Some(row),
-        _ => None,
-    })
 }
 
 /// Most work of a simulation, in steps of one particle: about two seconds on one thread. A jump in a scene

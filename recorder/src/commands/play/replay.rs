@@ -264,23 +264,13 @@ impl Replay {
         let paused = if self.state.is_paused { SnapshotFlags::PAUSED } else { 0 };
         SnapshotHeader {
             contract_version: CONTRACT_VERSION,
-            solver_version: self.run.solver_version,
             run_id: self.run_id,
-            step: row.step,
-            scene_step: row.scene_step,
             keyframe_step: self.state.keyframe_step(),
-            sim_time_ns: self.run.time_of_step_ns(row.step) - self.run.epoch_ns,
             publish_monotonic_ns: monotonic_ns(),
-            state_hash: row.state_hash,
-            outcome_count: row.outcome_count,
-            wake_late_ns: row.wake_late_ns,
-            solve_ns: row.solve_ns,
-            topology_revision: row.topology_revision,
-            torn_count: row.torn_count,
-            particle_count: self.run.particle_count,
             flags: SnapshotFlags::REPLAY | paused,
             stride: self.stride(row.step),
             snapshot_index: self.next_index,
+            ..self.run.snapshot_header(row)
         }
     }
 

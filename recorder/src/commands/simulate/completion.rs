@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context, bail};
+use recording::simulation::SimulationResult;
 use recording::verification::{Resimulation, SnapshotFinding};
 use recording::{
     Closing, ContentSelection, Frame, FrameReader, LogEnd, LogOptions, LogReader, LogWriter,
@@ -19,10 +20,7 @@ use crate::cli::damaged_input::lacks;
 pub(super) struct Completed {
     pub(super) scene: Scene,
     pub(super) first_step: u64,
-    pub(super) last_step: u64,
-    pub(super) state_hash: u64,
-    pub(super) applied_count: u64,
-    pub(super) rejected_count: u64,
+    pub(super) result: SimulationResult,
     /// The end of the input.
     pub(super) end: LogEnd,
     pub(super) is_interrupted: bool,
@@ -38,9 +36,8 @@ pub(super) struct Completion<R: Read> {
     scene: Scene,
     simulation: Option<Resimulation>,
     threads: usize,
-    result: Option<(u64, u64, u64)>,
-    applied_count: u64,
-    rejected_count: u64,
+    first_step: Option<u64>,
+    result: SimulationResult,
 }
 
 impl<R: Read> Completion<R> {
@@ -53,9 +50,8 @@ impl<R: Read> Completion<R> {
             scene,
             simulation: None,
             threads,
-            result: None,
-            applied_count: 0,
-            rejected_count: 0,
+            first_step: None,
+            result: SimulationResult::default(),
         })
     }
 
@@ -145,13 +141,13 @@ impl<R: Read> Completion<R> {
             return Ok(false);
         }
         finding.require_identical()?;
-        let first = self.result.map_or(frame.row.step, |(first, ..)| first);
-        self.result = Some((first, frame.row.step, frame.row.state_hash));
+        self.first_step.get_or_insert(frame.row.step);
+        (self.result.steps, self.result.state_hash) = (frame.row.step, frame.row.state_hash);
         for update in &frame.updates {
             if let Message::Outcome(row) = update {
                 let is_applied = row.is_applied();
-                self.applied_count += u64::from(is_applied);
-                self.rejected_count += u64::from(!is_applied);
+                self.result.applied_count += u64::from(is_applied);
+                self.result.rejected_count += u64::from(!is_applied);
             }
         }
         Ok(true)
@@ -204,16 +200,12 @@ impl<R: Read> Completion<R> {
     }
 
     fn completed(self, is_interrupted: bool) -> anyhow::Result<Completed> {
-        let result =
-            self.result.ok_or_else(|| lacks(&self.path, "has no snapshot", self.frames.end()));
-        let (first_step, last_step, state_hash) = result?;
+        let lacks_states = || lacks(&self.path, "has no snapshot", self.frames.end());
+        let first_step = self.first_step.ok_or_else(lacks_states)?;
         Ok(Completed {
             scene: self.scene,
             first_step,
-            last_step,
-            state_hash,
-            applied_count: self.applied_count,
-            rejected_count: self.rejected_count,
+            result: self.result,
             end: self.frames.end().cloned().unwrap_or(LogEnd::Complete),
             is_interrupted,
         })

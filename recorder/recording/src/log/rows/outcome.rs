@@ -11,8 +11,6 @@ use sim_messages::{
     OutcomeStatus, Reason, RestoreContents,
 };
 
-use super::JsonNumber;
-
 /// The outcome of a command: the flat command object with its status. The rows of a recording are a
 /// command file that reproduces it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -103,6 +101,19 @@ impl From<&OutcomeRow> for Outcome {
             outcome.flags |= OUTCOME_FLAG_NEW_RUN;
         }
         outcome
+    }
+}
+
+/// The schema of a number from a command, which may be any. Those of a state are finite.
+struct JsonNumber;
+
+impl JsonSchema for JsonNumber {
+    fn schema_name() -> Cow<'static, str> {
+        "Number".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "type": ["number", "string"], "pattern": "^(nan|-?inf)$" })
     }
 }
 
