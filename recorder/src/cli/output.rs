@@ -80,7 +80,9 @@ pub(crate) fn note_losses(path: &Path, end: &LogEnd, stop: &Stop) {
 }
 
 fn note_lines(lines: &[String]) {
-    lines.iter().for_each(|line| note(&format!("  {}", printable_line(line))));
+    for line in lines {
+        note(&format!("  {}", printable_line(line)));
+    }
 }
 
 /// Warns about a file that has another extension than its format, because other programs, and
