@@ -3,8 +3,6 @@
 mod chunk_reader;
 mod search;
 
-use std::sync::Arc;
-
 use sim_messages::{StopFlag, Torn};
 
 use super::index::IndexedLog;
