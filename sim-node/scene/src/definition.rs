@@ -266,7 +266,7 @@ impl Scene {
         generated.fold(self.particles.len() as u64, u64::saturating_add)
     }
 
-    /// Visits the explicit particles first, then those of each generator.
+    /// Visits the explicit particles first, then the particles of each generator.
     fn for_each_particle(&self, visit: &mut dyn FnMut(SceneParticle)) {
         self.particles.iter().copied().for_each(&mut *visit);
         for generator in &self.generators {

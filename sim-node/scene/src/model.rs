@@ -17,7 +17,7 @@ use sim_types::Method;
 pub struct Model {
     /// The particles at load.
     pub particles: Vec<SceneParticle>,
-    /// Explicit constraints first, then those of each generator.
+    /// Explicit constraints first, then the constraints of each generator.
     pub constraints: Vec<Constraint>,
     /// By constraint: the group of independent constraints that its shape declares.
     pub families: Vec<Option<u32>>,
@@ -31,7 +31,7 @@ pub struct Model {
     block: Option<u32>,
     /// By generated block: it has bends.
     pub bent_blocks: Vec<bool>,
-    /// Explicit bends first, then those of each generator.
+    /// Explicit bends first, then the bends of each generator.
     pub bends: Vec<Bend>,
     /// By bend: the group of independent bends that its shape declares.
     pub bend_families: Vec<Option<u32>>,

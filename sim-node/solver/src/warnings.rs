@@ -1,6 +1,7 @@
 //! Warnings about scenes that work, but probably not as intended.
 
-use sim_scene::scene::Scene;
+use sim_scene::Scene;
+
 mod bending;
 mod constraints;
 mod contacts;

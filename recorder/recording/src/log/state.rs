@@ -42,7 +42,7 @@ pub struct RecordedState {
 
 impl RecordedState {
     /// Starts before the first snapshot of a file, with the constraints that were torn before it and the
-    /// parameters of the first snapshot, which are those of the load.
+    /// parameters of the first snapshot, which equal the parameters at the load.
     pub fn before_first(topology: &TopologyRow, first: &Frame) -> Self {
         let mut parameters = first.updates.iter().rev();
         let parameters = parameters.find_map(|update| match update {

@@ -45,7 +45,7 @@ pub enum BendShape {
     /// and has the size |e| 2 sin(t / 2), where |e| is the length of the edge. With a rest value, C - rest
     /// n / |n| takes the place of C.
     Hinge {
-        /// C along n at rest, in m; 0 for a flat hinge. Its sign is that of the fold.
+        /// C along n at rest, in m; 0 for a flat hinge. Its sign is the sign of the fold angle.
         rest: f32,
         /// Area of the first triangle / area of the second.
         area_ratio: f32,
@@ -95,7 +95,7 @@ impl Bend {
         let mean = f64::midpoint(first, second);
         let sum = round(mean / first + mean / second);
         // The greater one is at least half of the sum, so the difference has no rounding: the sum of all
-        // coefficients is exactly 0, and so is that of the forces.
+        // coefficients is exactly 0, and so is the sum of the forces.
         let greater = round(mean / first.min(second));
         let (c_a, c_c) =
             if first < second { (greater, sum - greater) } else { (sum - greater, greater) };
